@@ -1,0 +1,1 @@
+"""Where should the cameras be? Pure numbers: no files, no devices, no HTTP."""

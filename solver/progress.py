@@ -1,0 +1,50 @@
+"""Progress and cancel are parameters of a call, never globals."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Where a solve is. ``fraction`` (0 to 1) never falls within one solve.
+
+    ``start`` counts from 0, -1 outside a start. ``cost`` is relative to the start's cost;
+    ``violation`` is the largest scaled breach of a limit.
+    """
+
+    stage: str
+    fraction: float
+    start: int = -1
+    iteration: int = 0
+    cost: float = float("nan")
+    violation: float = float("nan")
+
+
+class ProgressCallback(Protocol):
+    """Receives progress; must return quickly."""
+
+    def __call__(self, progress: Progress, /) -> None:
+        """Take note of ``progress``."""
+        ...
+
+
+class CancelToken(Protocol):
+    """Anything with ``is_set()``, such as ``threading.Event`` or ``multiprocessing.Event``."""
+
+    def is_set(self) -> bool:
+        """Whether the work should stop."""
+        ...
+
+
+def ignore_progress(progress: Progress, /) -> None:
+    """The progress callback that does nothing."""
+
+
+class NeverCancelled:
+    """The cancel token that is never set."""
+
+    def is_set(self) -> bool:
+        """Never."""
+        return False
