@@ -1,0 +1,6 @@
+"""Limits as rows of a nonlinear programme, one family of geometry per file.
+
+Every row knows its value, its derivative by the unknowns it touches and how to add its
+curvature to a Hessian. Lengths are in units of the length scale of
+:class:`solver.variables.Unknowns`.
+"""

@@ -1,0 +1,265 @@
+"""Eqs 6-7: information of rays, covariance of points, and the cost with two derivatives.
+
+A ray from a camera at C with optical axis a to a point at P, ``d = P - C``, ``z = a . d``,
+carries the information (Eq 6, one camera's ``B' W B``)
+
+    N = (f / (s z))**2 [ I - (d a' + a d') / z + (d . d / z**2) a a' ]
+
+with focal length f and image standard deviation s in pixels. It does not depend on the turn
+about the axis. The covariance of a point is ``Q = (N0 + sum N)^-1`` with prior information
+N0; the cost is the mean over the points of the norm of Q's eigenvalues (Eq 7), which is the
+Frobenius norm of Q.
+
+Lengths are in units of a length scale; arrays are camera by point, (n, p).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from geometry.arrays import Floats
+from solver.variables import PER_CAMERA, NetworkState
+
+_CHUNK = 512
+"""Points handled at a time where memory traffic, not arithmetic, takes the time."""
+
+_PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+
+
+def symmetric(entries: Floats) -> Floats:
+    """(p, 3, 3) matrices from their six entries (6, p): xx, yy, zz, xy, xz, yz."""
+    full = np.empty((entries.shape[1], 3, 3))
+    for (k, m), row in zip(_PAIRS, entries, strict=True):
+        full[:, k, m] = full[:, m, k] = row
+    return full
+
+
+@dataclass(frozen=True, eq=False)
+class _Rays:
+    """Quantities of all rays: d (3, n, p); z, d.d, weight (n, p)."""
+
+    d: Floats
+    z: Floats
+    rr: Floats
+    weight: Floats
+
+    def part(self, points: slice) -> _Rays:
+        """The rays of some of the points."""
+        return _Rays(self.d[:, :, points], self.z[:, points], self.rr[:, points], self.weight[:, points])
+
+
+def _rays(state: NetworkState, points: Floats, weight: Floats) -> _Rays:
+    d = points.T[:, None, :] - state.centre.T[:, :, None]
+    z = np.einsum("kip,ik->ip", d, state.axis)
+    # A point that no ray weighs must not poison the sums when it lies in the camera's plane.
+    z = np.where(weight > 0.0, z, 1.0)
+    return _Rays(d, z, np.einsum("kip,kip->ip", d, d), weight)
+
+
+def _normal_entries(rays: _Rays, axis: Floats, prior: float) -> Floats:
+    """Six entries of each point's normal matrix, (6, p)."""
+    alpha = rays.weight / rays.z**2
+    beta = alpha / rays.z
+    gamma = beta * rays.rr / rays.z
+    entries = np.empty((6, rays.z.shape[1]))
+    for row, (k, m) in enumerate(_PAIRS):
+        ak, am = axis[:, k], axis[:, m]
+        entries[row] = np.einsum("ip,i->p", gamma, ak * am)
+        entries[row] -= np.einsum("ip,ip,i->p", beta, rays.d[k], am)
+        entries[row] -= np.einsum("ip,ip,i->p", beta, rays.d[m], ak)
+    entries[:3] += alpha.sum(axis=0) + prior
+    return entries
+
+
+def normal_matrices(state: NetworkState, points: Floats, weight: Floats, prior: float) -> Floats:
+    """``N0 + sum N`` of each point, (p, 3, 3); ``weight`` (n, p) is (f/s)**2 or 0 where unseen."""
+    return symmetric(_normal_entries(_rays(state, points, weight), state.axis, prior))
+
+
+class CovarianceCost:
+    """The cost of Eq 7 with the seen rays held fixed, and its derivatives in closed form.
+
+    ``points`` (p, 3) and ``prior`` (information, 1 / sigma**2) in units of the length scale;
+    ``weight`` (n, p). ``gradient`` gives (7 n,), ``hessian`` (7 n, 7 n). Rays that end behind
+    their camera make the value NaN, which an interior-point solver answers with a shorter step.
+    """
+
+    def __init__(self, points: Floats, weight: Floats, prior: float, scale: float = 1.0) -> None:
+        self.points = points
+        self.weight = weight
+        self.prior = prior
+        self.scale = scale
+
+    def value(self, state: NetworkState) -> float:
+        """Mean norm of the covariances, divided by ``scale``."""
+        rays = _rays(state, self.points, self.weight)
+        if (rays.z <= 0.0).any():
+            return float("nan")
+        q = np.linalg.inv(symmetric(_normal_entries(rays, state.axis, self.prior)))
+        return float(np.sqrt(np.einsum("pkm,pkm->p", q, q)).mean() / self.scale)
+
+    def gradient(self, state: NetworkState) -> Floats:
+        """Derivative of :meth:`value` by all unknowns, (7 n,)."""
+        rays = _rays(state, self.points, self.weight)
+        q = np.linalg.inv(symmetric(_normal_entries(rays, state.axis, self.prior)))
+        norm = np.sqrt(np.einsum("pkm,pkm->p", q, q))
+        s = -(q @ q @ q) / norm[:, None, None]
+        by_d, by_a, *_ = self._first(rays, state.axis, s)
+        out = np.zeros((len(state.centre), PER_CAMERA))
+        out[:, 0:3] = np.einsum("iak,ik->ia", state.rotation_1[:, :, 2, :], by_a)
+        out[:, 3:6] = -by_d
+        return np.asarray(out.ravel() / (len(self.points) * self.scale))
+
+    def _first(self, rays: _Rays, axis: Floats, s: Floats) -> tuple[Floats, ...]:
+        """Sums over points of the derivatives of tr(S N) by d and a, each (n, 3), and parts."""
+        z, rr, w = rays.z, rays.rr, rays.weight
+        trace = np.einsum("pkk->p", s)
+        sa = np.einsum("pkm,im->kip", s, axis)
+        sd = np.einsum("pkm,mip->kip", s, rays.d)
+        b = np.einsum("kip,kip->ip", rays.d, sa)
+        c = np.einsum("kip,ik->ip", sa, axis)
+        inv = 1.0 / z
+        z3 = w * inv**3
+        z4 = z3 * inv
+        psi_z = -2.0 * trace * z3 + 6.0 * b * z4 - 4.0 * rr * c * z4 * inv
+        by_d = psi_z.sum(axis=1)[:, None] * axis
+        by_d += np.einsum("ip,kip->ik", -2.0 * z3, sa) + np.einsum("ip,kip->ik", 2.0 * c * z4, rays.d)
+        by_a = np.einsum("ip,kip->ik", psi_z, rays.d) + np.einsum("ip,kip->ik", -2.0 * z3, sd)
+        by_a += np.einsum("ip,kip->ik", 2.0 * rr * z4, sa)
+        return by_d, by_a, trace, sa, sd, b, c, psi_z
+
+    def hessian(self, state: NetworkState) -> Floats:
+        """Second derivative of :meth:`value`, (7 n, 7 n)."""
+        rays = _rays(state, self.points, self.weight)
+        lam, u = np.linalg.eigh(symmetric(_normal_entries(rays, state.axis, self.prior)))
+        lam = 1.0 / lam
+        norm = np.sqrt((lam**2).sum(axis=1))
+        s = -np.einsum("pkm,pm,pnm->pkn", u, lam**3, u) / norm[:, None, None]
+        n = len(state.centre)
+        out = self._between_cameras(rays, state, u, lam, norm)
+        blocks = self._within_cameras(rays, state, s)
+        for i in range(n):
+            own = slice(PER_CAMERA * i, PER_CAMERA * (i + 1))
+            out[own, own][:6, :6] += blocks[i]
+        return np.asarray(out / (len(self.points) * self.scale))
+
+    def _within_cameras(self, rays: _Rays, state: NetworkState, s: Floats) -> Floats:
+        """Curvature of each ray's information, weighted by S, (n, 6, 6)."""
+        axis = state.axis
+        _, by_a, trace, sa, sd, b, c, psi_z = self._first(rays, axis, s)
+        z, rr, w, d = rays.z, rays.rr, rays.weight, rays.d
+        inv = 1.0 / z
+        z3 = w * inv**3
+        z4 = z3 * inv
+        z5 = z4 * inv
+        zz = 6.0 * trace * z4 - 24.0 * b * z5 + 20.0 * rr * c * z5 * inv
+        zb, zr, zc = 6.0 * z4, -4.0 * c * z5, -4.0 * rr * z5
+        total = [zz.sum(axis=1), (c * z4).sum(axis=1), psi_z.sum(axis=1)]
+
+        def outer(left: Floats, right: Floats) -> Floats:
+            return np.asarray(np.einsum("ik,im->ikm", left, right))
+
+        def both(matrix: Floats) -> Floats:
+            return np.asarray(matrix + matrix.transpose(0, 2, 1))
+
+        def summed(factor: Floats, vector: Floats) -> Floats:
+            return np.asarray(np.einsum("ip,kip->ik", factor, vector))
+
+        def moment(left: Floats, factor: Floats, right: Floats) -> Floats:
+            return np.asarray((left * factor).transpose(1, 0, 2) @ right.transpose(1, 2, 0))
+
+        eye = np.eye(3)
+        dd = total[0][:, None, None] * outer(axis, axis) + 2.0 * total[1][:, None, None] * eye
+        dd += both(outer(axis, summed(zb, sa) + 2.0 * summed(zr, d)))
+        aa = moment(d, zz, d) + both(moment(d, zb, sd)) + 2.0 * both(moment(d, zc, sa))
+        aa += 2.0 * np.einsum("ip,pkm->ikm", rr * z4, s)
+        da = outer(axis, summed(zz, d) + summed(zb, sd) + 2.0 * summed(zc, sa))
+        da += moment(sa, zb, d) + 2.0 * moment(d, zr, d) + 4.0 * moment(d, z4, sa)
+        da += total[2][:, None, None] * eye - 2.0 * np.einsum("ip,pkm->ikm", z3, s)
+        return _chain(state, dd, aa, da, by_a)
+
+    def _between_cameras(
+        self, rays: _Rays, state: NetworkState, u: Floats, lam: Floats, norm: Floats
+    ) -> Floats:
+        """Curvature of the norm of the inverse, which couples all cameras of a point."""
+        n, p = rays.z.shape
+        coupled = np.zeros((6 * n, 6 * n))
+        for first in range(0, p, _CHUNK):
+            part = slice(first, first + _CHUNK)
+            change = _normal_changes(rays.part(part), state, u[part])
+            _add_coupling(coupled, change, lam[part], norm[part])
+        out = np.zeros((n, PER_CAMERA, n, PER_CAMERA))
+        out[:, :6, :, :6] = coupled.reshape(n, 6, n, 6)
+        return out.reshape(n * PER_CAMERA, n * PER_CAMERA)
+
+
+def _add_coupling(coupled: Floats, change: Floats, lam: Floats, norm: Floats) -> None:
+    """Add the second derivative of the norm of the inverse for some points to ``coupled``.
+
+    With X a change of N in the eigenbasis of Q (eigenvalues l), the second derivative of
+    ``|Q|`` is ``sum_km l_k l_m (l_k**2 + l_k l_m + l_m**2) X_km**2 / |Q|`` less
+    ``(sum_k l_k**3 X_kk)**2 / |Q|**3``.
+    """
+    six_n, p = len(coupled), len(lam)
+    weights = np.empty((6, p))
+    for row, (k, m) in enumerate(_PAIRS):
+        lk, lm = lam[:, k], lam[:, m]
+        twice = 1.0 if k == m else 2.0
+        weights[row] = np.sqrt(twice * lk * lm * (lk**2 + lk * lm + lm**2) / norm)
+    flat = np.einsum("vikp,pk->vip", change[:, :, :3], lam**3 / norm[:, None] ** 1.5)
+    change *= weights
+    tall = change.reshape(six_n, 6 * p)
+    flat = flat.reshape(six_n, p)
+    order = np.arange(six_n).reshape(6, -1).T.ravel()
+    coupled += (tall @ tall.T - flat @ flat.T)[np.ix_(order, order)]
+
+
+def _normal_changes(rays: _Rays, state: NetworkState, u: Floats) -> Floats:
+    """Derivatives of each ray's N by its camera's six pose unknowns in the eigenbasis of Q.
+
+    (6 unknowns, n, 6 entries, p). ``u`` (p, 3, 3) holds the eigenvectors as columns.
+    """
+    n, p = rays.z.shape
+    inv = 1.0 / rays.z
+    z3 = rays.weight * inv**3
+    z4 = z3 * inv
+    d = np.einsum("pkm,kip->mip", u, rays.d)
+    a = np.einsum("pkm,ik->mip", u, state.axis)
+    out = np.empty((6, n, 6, p))
+    for v in range(6):
+        if v < 3:
+            slope = state.rotation_1[:, v, 2, :]
+            e = np.einsum("pkm,ik->mip", u, slope)
+            dz = np.einsum("kip,ik->ip", rays.d, slope)
+            own, along = d, 4.0 * rays.rr * z4 * inv * dz
+            pull = rays.rr * z4
+        else:
+            e = np.broadcast_to(-u[:, v - 3, :].T[:, None, :], (3, n, p))
+            dz = np.broadcast_to(-state.axis[:, v - 3][:, None], (n, p))
+            own = a
+            along = 4.0 * rays.rr * z4 * inv * dz + 2.0 * z4 * rays.d[v - 3]
+            pull = None
+        mix, lead = 3.0 * z4 * dz, -2.0 * z3 * dz
+        for row, (k, m) in enumerate(_PAIRS):
+            entry = mix * (d[k] * a[m] + a[k] * d[m]) - along * a[k] * a[m]
+            entry -= z3 * (e[k] * own[m] + own[k] * e[m])
+            if pull is not None:
+                entry += pull * (e[k] * a[m] + a[k] * e[m])
+            if k == m:
+                entry += lead
+            out[v, :, row] = entry
+    return out
+
+
+def _chain(state: NetworkState, dd: Floats, aa: Floats, da: Floats, by_a: Floats) -> Floats:
+    """From second derivatives by d and a to those by the angles and the centre, (n, 6, 6)."""
+    slope = state.rotation_1[:, :, 2, :]
+    out = np.empty((len(dd), 6, 6))
+    out[:, :3, :3] = np.einsum("iak,ikm,ibm->iab", slope, aa, slope)
+    out[:, :3, :3] += np.einsum("iabk,ik->iab", state.rotation_2[:, :, :, 2, :], by_a)
+    out[:, 3:, 3:] = dd
+    out[:, 3:, :3] = -np.einsum("ikm,iam->ika", da, slope)
+    out[:, :3, 3:] = out[:, 3:, :3].transpose(0, 2, 1)
+    return out
