@@ -52,10 +52,11 @@ class _Rays:
 
 def _rays(state: NetworkState, points: Floats, weight: Floats) -> _Rays:
     d = points.T[:, None, :] - state.centre.T[:, :, None]
-    z = np.einsum("kip,ik->ip", d, state.axis)
+    axis = state.axis.T[:, :, None]
+    z = d[0] * axis[0] + d[1] * axis[1] + d[2] * axis[2]
     # A point that no ray weighs must not poison the sums when it lies in the camera's plane.
     z = np.where(weight > 0.0, z, 1.0)
-    return _Rays(d, z, np.einsum("kip,kip->ip", d, d), weight)
+    return _Rays(d, z, d[0] ** 2 + d[1] ** 2 + d[2] ** 2, weight)
 
 
 def _normal_entries(rays: _Rays, axis: Floats, prior: float) -> Floats:
@@ -64,11 +65,11 @@ def _normal_entries(rays: _Rays, axis: Floats, prior: float) -> Floats:
     beta = alpha / rays.z
     gamma = beta * rays.rr / rays.z
     entries = np.empty((6, rays.z.shape[1]))
+    # (3, p): sums over the cameras of beta d a' need each camera's axis once per component.
+    arms = [axis.T @ (beta * rays.d[k]) for k in range(3)]
+    squares = np.stack([axis[:, k] * axis[:, m] for k, m in _PAIRS]) @ gamma
     for row, (k, m) in enumerate(_PAIRS):
-        ak, am = axis[:, k], axis[:, m]
-        entries[row] = np.einsum("ip,i->p", gamma, ak * am)
-        entries[row] -= np.einsum("ip,ip,i->p", beta, rays.d[k], am)
-        entries[row] -= np.einsum("ip,ip,i->p", beta, rays.d[m], ak)
+        entries[row] = squares[row] - arms[k][m] - arms[m][k]
     entries[:3] += alpha.sum(axis=0) + prior
     return entries
 
@@ -100,6 +101,12 @@ class CovarianceCost:
         q = np.linalg.inv(symmetric(_normal_entries(rays, state.axis, self.prior)))
         return float(np.sqrt(np.einsum("pkm,pkm->p", q, q)).mean() / self.scale)
 
+    def typical(self, state: NetworkState) -> float:
+        """Median norm of the covariances: what the cost is made of when no point is lost."""
+        rays = _rays(state, self.points, self.weight)
+        q = np.linalg.inv(symmetric(_normal_entries(rays, state.axis, self.prior)))
+        return float(np.median(np.sqrt(np.einsum("pkm,pkm->p", q, q))))
+
     def gradient(self, state: NetworkState) -> Floats:
         """Derivative of :meth:`value` by all unknowns, (7 n,)."""
         rays = _rays(state, self.points, self.weight)
@@ -115,19 +122,20 @@ class CovarianceCost:
     def _first(self, rays: _Rays, axis: Floats, s: Floats) -> tuple[Floats, ...]:
         """Sums over points of the derivatives of tr(S N) by d and a, each (n, 3), and parts."""
         z, rr, w = rays.z, rays.rr, rays.weight
-        trace = np.einsum("pkk->p", s)
-        sa = np.einsum("pkm,im->kip", s, axis)
-        sd = np.einsum("pkm,mip->kip", s, rays.d)
-        b = np.einsum("kip,kip->ip", rays.d, sa)
-        c = np.einsum("kip,ik->ip", sa, axis)
+        trace = np.trace(s, axis1=1, axis2=2)
+        # (3, n, p) products of S with the axis and with d, one symmetric entry at a time.
+        entry = s.transpose(1, 2, 0)
+        sa = np.stack([axis @ entry[k] for k in range(3)])
+        sd = np.stack([sum(entry[k, m] * rays.d[m] for m in range(3)) for k in range(3)])
+        b = sum(rays.d[k] * sa[k] for k in range(3))
+        c = sum(sa[k] * axis[:, k, None] for k in range(3))
         inv = 1.0 / z
         z3 = w * inv**3
         z4 = z3 * inv
         psi_z = -2.0 * trace * z3 + 6.0 * b * z4 - 4.0 * rr * c * z4 * inv
         by_d = psi_z.sum(axis=1)[:, None] * axis
-        by_d += np.einsum("ip,kip->ik", -2.0 * z3, sa) + np.einsum("ip,kip->ik", 2.0 * c * z4, rays.d)
-        by_a = np.einsum("ip,kip->ik", psi_z, rays.d) + np.einsum("ip,kip->ik", -2.0 * z3, sd)
-        by_a += np.einsum("ip,kip->ik", 2.0 * rr * z4, sa)
+        by_d += _weighted(-2.0 * z3, sa) + _weighted(2.0 * c * z4, rays.d)
+        by_a = _weighted(psi_z, rays.d) + _weighted(-2.0 * z3, sd) + _weighted(2.0 * rr * z4, sa)
         return by_d, by_a, trace, sa, sd, b, c, psi_z
 
     def hessian(self, state: NetworkState) -> Floats:
@@ -164,18 +172,15 @@ class CovarianceCost:
         def both(matrix: Floats) -> Floats:
             return np.asarray(matrix + matrix.transpose(0, 2, 1))
 
-        def summed(factor: Floats, vector: Floats) -> Floats:
-            return np.asarray(np.einsum("ip,kip->ik", factor, vector))
-
         def moment(left: Floats, factor: Floats, right: Floats) -> Floats:
             return np.asarray((left * factor).transpose(1, 0, 2) @ right.transpose(1, 2, 0))
 
         eye = np.eye(3)
         dd = total[0][:, None, None] * outer(axis, axis) + 2.0 * total[1][:, None, None] * eye
-        dd += both(outer(axis, summed(zb, sa) + 2.0 * summed(zr, d)))
+        dd += both(outer(axis, _weighted(zb, sa) + 2.0 * _weighted(zr, d)))
         aa = moment(d, zz, d) + both(moment(d, zb, sd)) + 2.0 * both(moment(d, zc, sa))
         aa += 2.0 * np.einsum("ip,pkm->ikm", rr * z4, s)
-        da = outer(axis, summed(zz, d) + summed(zb, sd) + 2.0 * summed(zc, sa))
+        da = outer(axis, _weighted(zz, d) + _weighted(zb, sd) + 2.0 * _weighted(zc, sa))
         da += moment(sa, zb, d) + 2.0 * moment(d, zr, d) + 4.0 * moment(d, z4, sa)
         da += total[2][:, None, None] * eye - 2.0 * np.einsum("ip,pkm->ikm", z3, s)
         return _chain(state, dd, aa, da, by_a)
@@ -216,6 +221,11 @@ def _add_coupling(coupled: Floats, change: Floats, lam: Floats, norm: Floats) ->
     coupled += (tall @ tall.T - flat @ flat.T)[np.ix_(order, order)]
 
 
+def _weighted(factor: Floats, vector: Floats) -> Floats:
+    """Sums over the points of ``factor`` (n, p) times ``vector`` (3, n, p), (n, 3)."""
+    return np.asarray(np.matmul(vector.transpose(1, 0, 2), factor[:, :, None])[:, :, 0])
+
+
 def _normal_changes(rays: _Rays, state: NetworkState, u: Floats) -> Floats:
     """Derivatives of each ray's N by its camera's six pose unknowns in the eigenbasis of Q.
 
@@ -225,14 +235,15 @@ def _normal_changes(rays: _Rays, state: NetworkState, u: Floats) -> Floats:
     inv = 1.0 / rays.z
     z3 = rays.weight * inv**3
     z4 = z3 * inv
-    d = np.einsum("pkm,kip->mip", u, rays.d)
-    a = np.einsum("pkm,ik->mip", u, state.axis)
+    turn = u.transpose(2, 1, 0)
+    d = np.stack([sum(turn[m, k] * rays.d[k] for k in range(3)) for m in range(3)])
+    a = np.matmul(state.axis, turn)
     out = np.empty((6, n, 6, p))
     for v in range(6):
         if v < 3:
             slope = state.rotation_1[:, v, 2, :]
-            e = np.einsum("pkm,ik->mip", u, slope)
-            dz = np.einsum("kip,ik->ip", rays.d, slope)
+            e = np.matmul(slope, turn)
+            dz = sum(rays.d[k] * slope[:, k, None] for k in range(3))
             own, along = d, 4.0 * rays.rr * z4 * inv * dz
             pull = rays.rr * z4
         else:

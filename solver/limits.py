@@ -173,7 +173,7 @@ class Coverage:
     """
 
     tiers: tuple[CoverageTier, ...] = ()
-    unseen_sigma_mm: float = 10.0
+    unseen_sigma_mm: float = 1.0
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.unseen_sigma_mm) and self.unseen_sigma_mm > 0.0):

@@ -22,6 +22,8 @@ from solver.variables import FOCUS, PER_CAMERA, Unknowns
 class Scene:
     """Subject, cameras at their start, and limits.
 
+    ``anchor`` are the poses about which Eq 8 bounds the cameras, where these are not the start.
+
     Positions are divided by :attr:`length_mm`, the mean stand-off of the start, about
     :attr:`origin_mm`, the centroid of the design points.
     """
@@ -29,11 +31,13 @@ class Scene:
     subject: Subject
     cameras: tuple[RigCamera, ...]
     limits: Limits
+    anchor: tuple[Pose, ...] | None = None
+    origin: Floats | None = None
 
     @cached_property
     def origin_mm(self) -> Floats:
-        """Centroid of the design points, (3,)."""
-        return self.subject.design_points.centroid_mm
+        """Centroid of the design points (3,), unless ``origin`` gives another one."""
+        return self.subject.design_points.centroid_mm if self.origin is None else self.origin
 
     @cached_property
     def length_mm(self) -> float:
@@ -69,6 +73,12 @@ class Scene:
         """All unknowns (7 n,) at the start."""
         focus = np.array([c.focus_distance_mm for c in self.cameras])
         return self.unknowns.pack(tuple(c.pose for c in self.cameras), focus)
+
+    def anchor_values(self) -> Floats:
+        """All unknowns (7 n,) at the poses about which bounds hold."""
+        if self.anchor is None:
+            return self.start_values()
+        return self.unknowns.pack(self.anchor, np.array([c.focus_distance_mm for c in self.cameras]))
 
     def placed(self, values: Floats) -> tuple[RigCamera, ...]:
         """The cameras at the given unknowns; fixed ones are returned as they are."""

@@ -22,16 +22,19 @@ PLACE = slice(3, 6)
 FOCUS = 6
 
 
-def _elementary(angle: float, axis: int) -> tuple[Floats, Floats, Floats]:
-    """Elementary rotation about an axis (0: omega, 1: phi, 2: kappa) and two derivatives."""
-    c, s = np.cos(angle), np.sin(angle)
+def _elementary(angles: Floats, axis: int) -> tuple[Floats, Floats, Floats]:
+    """Elementary rotations (n, 3, 3) about one axis (0: omega, 1: phi, 2: kappa), two derivatives."""
+    c, s = np.cos(angles), np.sin(angles)
     sign = -1.0 if axis == 1 else 1.0
     i, j = [(1, 2), (0, 2), (0, 1)][axis]
-    value, first = np.eye(3), np.zeros((3, 3))
-    value[[i, i, j, j], [i, j, i, j]] = c, sign * s, -sign * s, c
-    first[[i, i, j, j], [i, j, i, j]] = -s, sign * c, -sign * c, -s
+    value, first = np.zeros((len(angles), 3, 3)), np.zeros((len(angles), 3, 3))
+    value[:, axis, axis] = 1.0
+    value[:, i, i] = value[:, j, j] = c
+    value[:, i, j], value[:, j, i] = sign * s, -sign * s
+    first[:, i, i] = first[:, j, j] = -s
+    first[:, i, j], first[:, j, i] = sign * c, -sign * c
     second = -value
-    second[axis, axis] = 0.0
+    second[:, axis, axis] = 0.0
     return value, first, second
 
 
@@ -100,21 +103,16 @@ class Unknowns:
     def state(self, values: Floats) -> NetworkState:
         """Rotations with two derivatives, centres and focus distances."""
         table = np.reshape(values, (self.count, PER_CAMERA))
-        rotation = np.empty((self.count, 3, 3))
-        first = np.empty((self.count, 3, 3, 3))
+        w, p, k = (_elementary(table[:, axis], axis) for axis in range(3))
+
+        def product(orders: Ints) -> Floats:
+            return np.asarray(PHOTO_TO_CV @ (k[orders[2]] @ p[orders[1]] @ w[orders[0]] @ self.base))
+
+        once = np.eye(3, dtype=np.int64)
+        first = np.stack([product(once[a]) for a in range(3)], axis=1)
         second = np.empty((self.count, 3, 3, 3, 3))
-        for k in range(self.count):
-            w = _elementary(table[k, 0], 0)
-            p = _elementary(table[k, 1], 1)
-            q = _elementary(table[k, 2], 2)
-
-            def product(i: int, j: int, m: int, w=w, p=p, q=q, k=k) -> Floats:  # type: ignore[no-untyped-def]  # noqa: ANN001
-                return np.asarray(PHOTO_TO_CV @ q[m] @ p[j] @ w[i] @ self.base[k])
-
-            rotation[k] = product(0, 0, 0)
-            orders = np.eye(3, dtype=int)
-            for a in range(3):
-                first[k, a] = product(*orders[a])
-                for b in range(a, 3):
-                    second[k, a, b] = second[k, b, a] = product(*(orders[a] + orders[b]))
+        for a in range(3):
+            for b in range(a, 3):
+                second[:, a, b] = second[:, b, a] = product(once[a] + once[b])
+        rotation = product(np.zeros(3, dtype=np.int64))
         return NetworkState(rotation, first, second, table[:, PLACE], table[:, FOCUS])

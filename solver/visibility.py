@@ -62,10 +62,15 @@ def sight(
 
 @dataclass(frozen=True, eq=False)
 class Horizons:
-    """Planes over which a camera must rise to see a point: ``normal . (C - point) >= 0``."""
+    """Planes over which a camera must rise to see a point: ``normal . (C - point) >= 0``.
+
+    ``point_mm``, ``normal`` (m, 3); ``swing_deg`` (m,) the angle to rise by, infinite where the
+    point is hidden even from the direction in which it was hoped to be visible.
+    """
 
     point_mm: Floats
     normal: Floats
+    swing_deg: Floats
 
 
 def horizons(
@@ -80,7 +85,8 @@ def horizons(
     at, normal = points.points_mm[rows], points.normals[rows]
     start = at + occluder.lift_mm * normal
     hidden_way = _unit(eyes_mm - start)
-    open_way = _unit(open_mm)
+    open_way, first_way = _unit(open_mm), hidden_way
+    lost = occluder.first_hits(start, open_way)[0] >= 0
     graze = np.zeros_like(at)
     for _ in range(14):
         middle = _unit(hidden_way + open_way)
@@ -94,7 +100,8 @@ def horizons(
     poor = np.linalg.norm(plane, axis=1) < 0.3
     plane[poor] = arc[poor]
     plane *= np.where(np.einsum("rk,rk->r", plane, arc) < 0.0, -1.0, 1.0)[:, None]
-    return Horizons(at, _unit(plane))
+    swing = np.degrees(np.arccos(np.clip(np.einsum("rk,rk->r", open_way, first_way), -1.0, 1.0)))
+    return Horizons(at, _unit(plane), np.where(lost, np.inf, swing))
 
 
 def _unit(vectors: Floats) -> Floats:

@@ -1,0 +1,59 @@
+"""All rows that a working set may be chosen from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from geometry.arrays import Floats, Ints
+from solver.constraints.base import Block
+from solver.variables import NetworkState
+
+VIOLATED = 1e-7
+"""A row further out than this (in the solver's units of order one) is taken into the set."""
+
+
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """A block whose rows compete in groups; the tightest ``keep`` of each are worked on.
+
+    ``group`` (rows,) names the group of each row, for example its camera and side of the frame.
+    """
+
+    block: Block
+    group: Ints
+    keep: int
+
+    @classmethod
+    def all_of(cls, block: Block) -> Candidates:
+        """A block of which every row is always worked on."""
+        return cls(block, np.zeros(block.rows, dtype=np.int64), block.rows)
+
+    def choose(self, state: NetworkState, held: Ints) -> Ints:
+        """``held`` rows, with the tightest of each group and those that are violated added."""
+        if self.keep >= self.block.rows:
+            return np.arange(self.block.rows)
+        slack = self.block.slack(state)
+        order = np.lexsort((slack, self.group))
+        group = self.group[order]
+        first = np.flatnonzero(np.r_[True, group[1:] != group[:-1]])
+        rank = np.arange(len(order)) - np.repeat(first, np.diff(np.r_[first, len(order)]))
+        # Of many violated rows of a group the worst few stand for the rest in this step.
+        taken = (rank < self.keep) | ((slack[order] < -VIOLATED) & (rank < 4 * self.keep))
+        chosen = np.zeros(len(order), dtype=np.bool_)
+        chosen[order[taken]] = True
+        chosen[held] = True
+        return np.flatnonzero(chosen)
+
+    def missed(self, state: NetworkState, held: Ints) -> bool:
+        """Whether a row outside ``held`` is violated."""
+        out = self.block.slack(state) < -VIOLATED
+        out[held] = False
+        return bool(out.any())
+
+
+def grouped(*keys: Ints | Floats) -> Ints:
+    """One integer per distinct combination of the keys, (rows,)."""
+    table = np.stack([np.asarray(k) for k in keys], axis=1)
+    return np.asarray(np.unique(table, axis=0, return_inverse=True)[1].ravel(), dtype=np.int64)

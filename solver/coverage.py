@@ -1,0 +1,171 @@
+"""Coverage of a network in the solver's inner loop: who is seen, what is promised, what is lost."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from geometry.arrays import Bools, Floats, Ints
+from geometry.camera import RigCamera
+from solver.candidates import Candidates
+from solver.constraints.base import bound
+from solver.constraints.places import PlaceCones
+from solver.motion import HeadPosition
+from solver.promises import Promises, promise
+from solver.scene import Scene
+from solver.variables import NetworkState
+from solver.visibility import Sight, horizons, sight
+
+_HORIZON_MARGIN = float(np.sin(np.radians(0.3)))
+"""A camera stays this far above a horizon: ray casting against facets is no more exact."""
+
+
+_ABOUT_TO_BE_SEEN_DEG = 5.0
+
+
+@dataclass(frozen=True, eq=False)
+class Views:
+    """What is seen at one state: ``seen`` (n, p) and the promises made.
+
+    ``framed`` (n, p) are the points kept in frame and in focus: those seen, and those that a
+    small move might bring into view. Without the latter, every round would find new points
+    just outside the frame.
+    """
+
+    seen: Bools
+    framed: Bools
+    promises: Promises
+
+
+def centres_mm(scene: Scene, state: NetworkState) -> Floats:
+    """Projection centres (n, 3) in the rig frame."""
+    return np.asarray(state.centre * scene.length_mm + scene.origin_mm)
+
+
+def in_frame(camera: RigCamera, points_mm: Floats, margin_px: float = 0.0) -> Bools:
+    """Which points (n, 3) fall inside a camera's image, (n,)."""
+    pixels, depth = camera.camera.project(camera.pose, points_mm)
+    w, h = camera.camera.image_size_px
+    low, high = margin_px - 0.5, -0.5 - margin_px
+    inside = (pixels > low).all(axis=1) & (pixels[:, 0] < w + high) & (pixels[:, 1] < h + high)
+    return np.asarray(inside & (depth > 0.0))
+
+
+def views(scene: Scene, state: NetworkState, earlier: Views | None = None) -> Views:
+    """Cast all rays and decide which views to promise.
+
+    Free cameras are given frame and focus as limits, so facing and a free line of sight are
+    enough; fixed cameras only see what is in their frame. What was framed and promised in an
+    ``earlier`` round is held on to, so that rounds settle.
+    """
+    source = scene.subject.design_points
+    limit = scene.limits.incidence.ray_max_deg
+    found = sight(source, scene.subject.occluder, centres_mm(scene, state), limit, scene.visibility_positions)
+    seen = found.seen
+    for i, camera in enumerate(scene.cameras):
+        if camera.fixed:
+            seen[i] &= in_frame(camera, source.points_mm)
+    fixed = np.array([c.fixed for c in scene.cameras])
+    framed = seen | (found.cosine > np.cos(np.radians(min(limit + _ABOUT_TO_BE_SEEN_DEG, 90.0))))
+    before = None
+    if earlier is not None:
+        framed, before = framed | earlier.framed, earlier.promises
+    deficits = _deficits(scene, state, found, seen)
+    return Views(seen, framed, promise(scene.limits.coverage.tiers, deficits, fixed, before))
+
+
+def _deficits(scene: Scene, state: NetworkState, found: Sight, seen: Bools) -> Floats:
+    """How far each camera is from seeing each point, (n, p) degrees; see :func:`promise`."""
+    limit = scene.limits.incidence.ray_max_deg
+    incidence = np.degrees(np.arccos(np.clip(found.cosine, -1.0, 1.0)))
+    out = np.where(seen, incidence - limit - 1e-9, np.inf)
+    most = max((t.views for t in scene.limits.coverage.tiers), default=0)
+    poor = seen.sum(axis=0) < min(most, scene.count)
+    camera, point = np.nonzero(~seen & poor)
+    if len(camera) == 0:
+        return out
+    source = scene.subject.design_points
+    eyes = centres_mm(scene, state)[camera]
+    hidden = horizons(source, scene.subject.occluder, point, eyes, source.normals[point])
+    facing = np.maximum(0.0, incidence[camera, point] - limit)
+    out[camera, point] = np.maximum(hidden.swing_deg, facing) + 1e-6
+    return out
+
+
+@dataclass(frozen=True, eq=False)
+class Cuts:
+    """Horizons that cameras must stay above to see points they were promised.
+
+    ``camera`` and ``point`` (m,) name the ray; ``place`` and ``normal`` (m, 3) the plane, in
+    the solver's units.
+    """
+
+    camera: Ints
+    point: Ints
+    place: Floats
+    normal: Floats
+
+    @classmethod
+    def none(cls) -> Cuts:
+        """No cuts."""
+        empty = np.zeros(0, dtype=np.int64)
+        return cls(empty, empty, np.zeros((0, 3)), np.zeros((0, 3)))
+
+    def joined(self, other: Cuts) -> Cuts:
+        """These cuts and the others."""
+        return Cuts(
+            np.concatenate([self.camera, other.camera]),
+            np.concatenate([self.point, other.point]),
+            np.concatenate([self.place, other.place]),
+            np.concatenate([self.normal, other.normal]),
+        )
+
+    def of(self, promises: Promises) -> Cuts:
+        """The cuts of rays that are still promised."""
+        stride = 1 + int(max(self.point.max(initial=0), promises.point.max(initial=0)))
+        keep = np.isin(self.camera * stride + self.point, promises.camera * stride + promises.point)
+        return Cuts(self.camera[keep], self.point[keep], self.place[keep], self.normal[keep])
+
+    def rows(self, scene: Scene) -> list[Candidates]:
+        """The cuts as rows, all of them worked on."""
+        if len(self.camera) == 0:
+            return []
+        block = PlaceCones(
+            "coverage", "mm", scene.length_mm, bound(0.0, self.camera), bound(np.inf, self.camera),
+            self.camera, self.place, self.normal, bound(_HORIZON_MARGIN, self.camera),
+        )  # fmt: skip
+        return [Candidates.all_of(block)]
+
+
+def cuts_for_hidden(scene: Scene, state: NetworkState, promises: Promises, open_mm: Floats) -> Cuts:
+    """Horizons for the promised rays that something hides at ``state``, in every head position.
+
+    ``open_mm`` (m, 3) are directions of the rig frame in which each promised point is visible.
+    """
+    source, occluder = scene.subject.design_points, scene.subject.occluder
+    points, normals = source.points_mm[promises.point], source.normals[promises.point]
+    eyes = centres_mm(scene, state)[promises.camera]
+    cuts = Cuts.none()
+    for position in scene.visibility_positions:
+        local = _in_head(position, eyes)
+        rows = np.flatnonzero(occluder.hidden(points, normals, local))
+        if len(rows) == 0:
+            continue
+        found = horizons(source, occluder, promises.point[rows], local[rows], open_mm[rows] @ position.turn)
+        place = scene.scaled(position.points(found.point_mm))
+        normal = position.directions(found.normal)
+        cuts = cuts.joined(Cuts(promises.camera[rows], promises.point[rows], place, normal))
+    return cuts
+
+
+def _in_head(position: HeadPosition, eyes_mm: Floats) -> Floats:
+    """Eyes (m, 3) as seen by somebody fixed to the moved head."""
+    return np.asarray((eyes_mm - position.pivot_mm - position.shift_mm) @ position.turn + position.pivot_mm)
+
+
+def opening_directions(scene: Scene, state: NetworkState, promises: Promises) -> Floats:
+    """Directions (m, 3) in which promised points can be seen: today's ray, or else the normal."""
+    source = scene.subject.design_points
+    way = centres_mm(scene, state)[promises.camera] - source.points_mm[promises.point]
+    return np.where(promises.kept[:, None], way, source.normals[promises.point])

@@ -1,0 +1,190 @@
+"""Solvers of a programme: IPOPT, and SciPy's SLSQP as an independent second opinion."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from geometry.arrays import Floats
+from solver.programme import Programme
+
+Watch = Callable[[int, float, float], bool]
+"""Called with iteration, objective and violation; returns False to stop."""
+
+IPOPT_OPTIONS: dict[str, int | float | str] = {
+    "print_level": 0,
+    "sb": "yes",
+    "tol": 1e-7,
+    "constr_viol_tol": 1e-9,
+    "acceptable_tol": 1e-5,
+    "acceptable_constr_viol_tol": 1e-8,
+    "acceptable_iter": 8,
+    "max_iter": 300,
+    # By default IPOPT widens all bounds by 1e-8 before it starts; limits are meant as given.
+    "bound_relax_factor": 0.0,
+    "mu_strategy": "adaptive",
+}
+
+WARM_OPTIONS: dict[str, int | float | str] = {
+    "warm_start_init_point": "yes",
+    "warm_start_bound_push": 1e-6,
+    "warm_start_bound_frac": 1e-6,
+    "warm_start_slack_bound_push": 1e-6,
+    "warm_start_slack_bound_frac": 1e-6,
+    "warm_start_mult_bound_push": 1e-6,
+    "mu_strategy": "monotone",
+    "mu_init": 1e-4,
+}
+
+_WORDS = {
+    0: "the optimality conditions hold to the tolerance",
+    1: "the optimality conditions hold to the looser, acceptable tolerance",
+    2: "the rows could not be satisfied near here",
+    3: "the search direction became too small",
+    4: "the iterates diverged",
+    5: "stopped by request",
+    6: "a feasible network was found",
+    -1: "the limit of iterations was reached",
+    -2: "the restoration of feasibility failed",
+    -3: "the step could not be computed",
+    -4: "the limit of time was reached",
+    -10: "there are more equalities than unknowns",
+    -13: "the cost or a row is not a number at the start",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """Where a solver ended: variables, ``L = f + multipliers . g`` and why."""
+
+    variables: Floats
+    multipliers: Floats
+    bound_multipliers: tuple[Floats, Floats]
+    kkt_error: float
+    iterations: int
+    success: bool
+    stopped: bool
+    why: str
+
+
+@dataclass(frozen=True, eq=False)
+class WarmStart:
+    """Multipliers of an earlier solve: of the rows, of the lower and of the upper bounds."""
+
+    rows: Floats
+    below: Floats
+    above: Floats
+
+
+def solve_ipopt(
+    programme: Programme,
+    start: Floats,
+    watch: Watch,
+    warm: WarmStart | None = None,
+    options: dict[str, int | float | str] | None = None,
+) -> Outcome:
+    """Interior point with exact second derivatives (COIN-OR IPOPT, MUMPS inside)."""
+    import ipyopt
+
+    low, high = programme.bounds
+    row_low, row_high = programme.row_bounds
+    reached = {"iterations": 0, "stopped": False}
+
+    def into(function: Callable[..., Floats]) -> Callable[..., None]:
+        def call(x: Floats, *args: Any) -> None:
+            args[-1][()] = function(x, *args[:-1])
+
+        return call
+
+    def intermediate(mode: int, iteration: int, cost: float, breach: float, *_: float) -> bool:
+        del mode
+        reached["iterations"] = iteration
+        go_on = watch(iteration, cost, breach)
+        reached["stopped"] = not go_on
+        return go_on
+
+    problem = ipyopt.Problem(
+        n=programme.size, x_l=_wide(low), x_u=_wide(high), m=programme.rows,
+        g_l=_wide(row_low), g_u=_wide(row_high),
+        sparsity_indices_jac_g=programme.jacobian_pattern,
+        sparsity_indices_h=programme.hessian_pattern,
+        eval_f=programme.objective, eval_grad_f=into(programme.gradient), eval_g=into(programme.values),
+        eval_jac_g=into(programme.jacobian), eval_h=into(programme.hessian),
+        intermediate_callback=intermediate, ipopt_options=IPOPT_OPTIONS | (WARM_OPTIONS if warm is not None else {}) | (options or {}),
+    )  # fmt: skip
+    multipliers, below, above = np.zeros(programme.rows), np.zeros(programme.size), np.zeros(programme.size)
+    if warm is not None:
+        multipliers, below, above = warm.rows.copy(), warm.below.copy(), warm.above.copy()
+    inside = np.clip(start, low, high)
+    x, _, status = problem.solve(inside, mult_g=multipliers, mult_x_L=below, mult_x_U=above)
+    x = np.asarray(x)
+    kkt = programme.kkt_error(x, multipliers, above - below)
+    why = _WORDS.get(status, f"IPOPT ended with status {status}")
+    stopped = bool(reached["stopped"])
+    return Outcome(x, multipliers, (below, above), kkt, int(reached["iterations"]), status in (0, 1), stopped, why)
+
+
+def _wide(bounds: Floats) -> Floats:
+    """Bounds with infinity as IPOPT knows it."""
+    return np.clip(bounds, -1e20, 1e20)
+
+
+class _Stopped(Exception):  # noqa: N818 - a signal, not an error
+    """Raised out of SciPy's callback to end a run."""
+
+
+def solve_slsqp(programme: Programme, start: Floats, watch: Watch, max_iterations: int = 500) -> Outcome:
+    """Sequential least squares programming with exact first derivatives (SciPy)."""
+    from scipy.optimize import Bounds, minimize
+
+    low, high = programme.row_bounds
+    equal = low == high
+    sides = [(np.flatnonzero(equal), low, 1.0)]
+    sides += [(np.flatnonzero(~equal & np.isfinite(low)), low, 1.0)]
+    sides += [(np.flatnonzero(~equal & np.isfinite(high)), high, -1.0)]
+    row, column = programme.jacobian_pattern
+
+    def dense(x: Floats) -> Floats:
+        out = np.zeros((programme.rows, programme.size))
+        np.add.at(out, (row, column), programme.jacobian(x))
+        return out
+
+    constraints = [
+        {
+            "type": "eq" if k == 0 else "ineq",
+            "fun": lambda x, r=rows, b=bound_, s=sign: s * (programme.values(x)[r] - b[r]),
+            "jac": lambda x, r=rows, s=sign: s * dense(x)[r],
+        }
+        for k, (rows, bound_, sign) in enumerate(sides)
+        if len(rows)
+    ]
+    latest = {"x": np.clip(start, *programme.bounds), "iterations": 0}
+
+    def callback(x: Floats) -> None:
+        latest["x"] = np.array(x)
+        latest["iterations"] += 1
+        if not watch(int(latest["iterations"]), programme.objective(x), violation(programme, x)):
+            raise _Stopped
+
+    try:
+        result = minimize(
+            programme.objective, latest["x"], jac=programme.gradient, method="SLSQP", callback=callback,
+            bounds=Bounds(*programme.bounds), constraints=constraints,
+            options={"maxiter": max_iterations, "ftol": 1e-12},
+        )  # fmt: skip
+    except _Stopped:
+        return Outcome(latest["x"], np.zeros(0), np.nan, int(latest["iterations"]), False, True, _WORDS[5])
+    why = str(result.message).rstrip(".").lower()
+    return Outcome(result.x, np.zeros(0), np.nan, int(result.nit), bool(result.success), False, why)
+
+
+def violation(programme: Programme, variables: Floats) -> float:
+    """Largest breach of any row or bound."""
+    values = programme.values(variables)
+    low, high = programme.row_bounds
+    rows = np.maximum(low - values, values - high).max(initial=0.0)
+    x_low, x_high = programme.bounds
+    return float(max(rows, np.maximum(x_low - variables, variables - x_high).max(initial=0.0), 0.0))

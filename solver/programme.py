@@ -1,0 +1,281 @@
+"""The nonlinear programme of one working set: cost, rows, bounds, and what is free."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+
+from geometry.arrays import Bools, Floats, Ints
+from solver.constraints.base import Block
+from solver.variables import NetworkState, Unknowns
+
+
+class Cost(Protocol):
+    """A function of the network to be made small."""
+
+    def value(self, state: NetworkState) -> float:
+        """The cost."""
+
+    def gradient(self, state: NetworkState) -> Floats:
+        """Its derivative by all unknowns, (7 n,)."""
+
+    def hessian(self, state: NetworkState) -> Floats:
+        """Its second derivative, (7 n, 7 n)."""
+
+
+class NoCost:
+    """The cost that is zero: for programmes that only seek a feasible network."""
+
+    def value(self, state: NetworkState) -> float:  # noqa: ARG002 - the protocol's signature
+        """Zero."""
+        return 0.0
+
+    def gradient(self, state: NetworkState) -> Floats:
+        """Zeros (7 n,)."""
+        return np.zeros(7 * len(state.centre))
+
+    def hessian(self, state: NetworkState) -> Floats:
+        """Zeros (7 n, 7 n)."""
+        return np.zeros((7 * len(state.centre),) * 2)
+
+
+@dataclass(frozen=True, eq=False)
+class Programme:
+    """Minimise ``cost + prices . concessions`` subject to rows and bounds.
+
+    The variables are the free unknowns followed by the concessions, zero or more: one for each
+    of the ``soft`` families, by which all its rows may be broken, and one for each row of the
+    families in ``each``, where a row that cannot be had must not excuse the others. ``lower``
+    and ``upper`` (7 n,) bound all unknowns. ``frozen`` (7 n,) holds the unknowns that do not
+    change.
+    """
+
+    unknowns: Unknowns
+    cost: Cost
+    blocks: tuple[Block, ...]
+    lower: Floats
+    upper: Floats
+    frozen: Floats
+    soft: tuple[str, ...] = ()
+    each: tuple[str, ...] = ()
+    price: float = 1.0
+    each_price: float = 1.0
+
+    @property
+    def free(self) -> Ints:
+        """Indices of the free unknowns."""
+        return self.unknowns.free
+
+    @property
+    def size(self) -> int:
+        """Number of variables."""
+        return len(self.free) + self.concession_count
+
+    @cached_property
+    def concession_count(self) -> int:
+        """Number of concessions."""
+        rows = sum(b.rows for b in self.blocks if b.family in self.each)
+        return len(self.soft) + rows
+
+    @cached_property
+    def prices(self) -> Floats:
+        """Price of each concession."""
+        single = len(self.soft)
+        return np.r_[np.full(single, self.price), np.full(self.concession_count - single, self.each_price)]
+
+    @cached_property
+    def bounds(self) -> tuple[Floats, Floats]:
+        """Lower and upper bounds of the variables."""
+        none, many = np.zeros(self.concession_count), np.full(self.concession_count, np.inf)
+        return np.r_[self.lower[self.free], none], np.r_[self.upper[self.free], many]
+
+    @cached_property
+    def _sides(self) -> list[tuple[Block, Ints, float, Ints]]:
+        """Blocks with the rows used, the sign of their concession and its variables (or none)."""
+        out = []
+        none = np.zeros(0, dtype=np.int64)
+        next_each = len(self.free) + len(self.soft)
+        for block in self.blocks:
+            every = np.arange(block.rows)
+            if block.family in self.each:
+                variables = next_each + every
+                next_each += block.rows
+            elif block.family in self.soft:
+                variables = np.full(block.rows, len(self.free) + self.soft.index(block.family))
+            else:
+                out.append((block, every, 0.0, none))
+                continue
+            for bound_, sign in ((block.lower, 1.0), (block.upper, -1.0)):
+                rows = every[np.isfinite(bound_)]
+                if len(rows):
+                    out.append((block, rows, sign, variables[rows]))
+        return out
+
+    @cached_property
+    def row_bounds(self) -> tuple[Floats, Floats]:
+        """Lower and upper bounds of the rows."""
+        low, high = [np.zeros(0)], [np.zeros(0)]
+        for block, rows, sign, _ in self._sides:
+            low.append(block.lower[rows] if sign >= 0.0 else np.full(len(rows), -np.inf))
+            high.append(block.upper[rows] if sign <= 0.0 else np.full(len(rows), np.inf))
+        return np.concatenate(low), np.concatenate(high)
+
+    @property
+    def rows(self) -> int:
+        """Number of rows."""
+        return len(self.row_bounds[0])
+
+    @cached_property
+    def _place(self) -> Ints:
+        """Variable of each unknown, -1 when it is not free."""
+        place = np.full(len(self.frozen), -1, dtype=np.int64)
+        place[self.free] = np.arange(len(self.free))
+        return place
+
+    @cached_property
+    def _pattern(self) -> tuple[Ints, Ints, list[Bools]]:
+        """Rows and columns of the Jacobian's entries, and per side which entries are used."""
+        row_index, column_index, used = [], [], []
+        first = 0
+        for block, rows, _, variables in self._sides:
+            columns = self._place[block.columns[rows]]
+            keep = columns >= 0
+            row_index.append(np.nonzero(keep)[0] + first)
+            column_index.append(columns[keep])
+            used.append(keep)
+            if len(variables):
+                row_index.append(np.arange(len(rows)) + first)
+                column_index.append(variables)
+            first += len(rows)
+        if not row_index:
+            return np.zeros(0, np.int64), np.zeros(0, np.int64), used
+        return np.concatenate(row_index), np.concatenate(column_index), used
+
+    @property
+    def jacobian_pattern(self) -> tuple[Ints, Ints]:
+        """Rows and columns of the entries of :meth:`jacobian`."""
+        return self._pattern[0], self._pattern[1]
+
+    @cached_property
+    def hessian_pattern(self) -> tuple[Ints, Ints]:
+        """Rows and columns of the entries of :meth:`hessian`: a lower triangle."""
+        rows, columns = np.tril_indices(len(self.free))
+        return rows, columns
+
+    def pack(self, values: Floats, concessions: Floats | None = None) -> Floats:
+        """Variables of all unknowns (7 n,) and concessions."""
+        extra = np.zeros(self.concession_count) if concessions is None else concessions
+        return np.r_[values[self.free], extra]
+
+    def all_unknowns(self, variables: Floats) -> Floats:
+        """All unknowns (7 n,) of the variables."""
+        full = self.frozen.copy()
+        full[self.free] = variables[: len(self.free)]
+        return full
+
+    def concessions(self, variables: Floats) -> dict[str, float]:
+        """How far each soft family gave way."""
+        given = variables[len(self.free) : len(self.free) + len(self.soft)]
+        return dict(zip(self.soft, map(float, given), strict=True))
+
+    def state(self, variables: Floats) -> NetworkState:
+        """The network at the variables, remembered for the calls that follow at the same place."""
+        key = variables.tobytes()
+        if self._memory.get("key") != key:
+            self._memory["key"] = key
+            self._memory["state"] = self.unknowns.state(self.all_unknowns(variables))
+        return self._memory["state"]  # type: ignore[return-value]
+
+    @cached_property
+    def _memory(self) -> dict[str, object]:
+        return {}
+
+    def objective(self, variables: Floats) -> float:
+        """Cost and price of the concessions."""
+        extra = float(self.prices @ variables[len(self.free) :])
+        return self.cost.value(self.state(variables)) + extra
+
+    def gradient(self, variables: Floats) -> Floats:
+        """Derivative of :meth:`objective`."""
+        full = self.cost.gradient(self.state(variables))
+        return np.r_[full[self.free], self.prices]
+
+    def values(self, variables: Floats) -> Floats:
+        """Values of all rows."""
+        state = self.state(variables)
+        parts = [np.zeros(0)]
+        known: dict[int, Floats] = {}
+        for block, rows, sign, conceding in self._sides:
+            if id(block) not in known:
+                known[id(block)] = block.value(state)
+            give = sign * variables[conceding] if len(conceding) else 0.0
+            parts.append(known[id(block)][rows] + give)
+        return np.concatenate(parts)
+
+    def jacobian(self, variables: Floats) -> Floats:
+        """Entries of the Jacobian in the order of :attr:`jacobian_pattern`."""
+        state = self.state(variables)
+        parts = [np.zeros(0)]
+        for (block, rows, sign, conceding), keep in zip(self._sides, self._pattern[2], strict=True):
+            parts.append(block.jacobian(state)[rows][keep])
+            if len(conceding):
+                parts.append(np.full(len(rows), sign))
+        return np.concatenate(parts)
+
+    def hessian(self, variables: Floats, multipliers: Floats, factor: float) -> Floats:
+        """Entries of the Hessian of the Lagrangian in the order of :attr:`hessian_pattern`."""
+        state = self.state(variables)
+        size = len(self.frozen)
+        full = factor * self.cost.hessian(state) if factor else np.zeros((size, size))
+        first = 0
+        for block, rows, _, _ in self._sides:
+            weights = np.zeros(block.rows)
+            weights[rows] = multipliers[first : first + len(rows)]
+            block.add_hessian(state, weights, full)
+            first += len(rows)
+        rows_, columns = self.hessian_pattern
+        return np.asarray(full[self.free[rows_], self.free[columns]])
+
+    def hessian_matrix(self, variables: Floats, multipliers: Floats) -> Floats:
+        """Hessian of the Lagrangian by the free unknowns, (free, free)."""
+        entries = self.hessian(variables, multipliers, 1.0)
+        full = np.zeros((len(self.free), len(self.free)))
+        rows, columns = self.hessian_pattern
+        full[rows, columns] = entries
+        full[columns, rows] = entries
+        return full
+
+    def by_block(self, multipliers: Floats) -> list[Floats]:
+        """Multipliers of the rows as one array per block; both sides of a soft row added up."""
+        out = {id(b): np.zeros(b.rows) for b in self.blocks}
+        first = 0
+        for block, rows, _, _ in self._sides:
+            out[id(block)][rows] += multipliers[first : first + len(rows)]
+            first += len(rows)
+        return [out[id(b)] for b in self.blocks]
+
+    def from_blocks(self, multipliers: list[Floats]) -> Floats:
+        """Inverse of :meth:`by_block`: a soft row's multiplier goes to the side of its sign."""
+        known = {id(b): m for b, m in zip(self.blocks, multipliers, strict=True)}
+        parts = [np.zeros(0)]
+        for block, rows, sign, _ in self._sides:
+            part = known[id(block)][rows]
+            parts.append(part if sign == 0.0 else np.where(part * sign < 0.0, part, 0.0))
+        return np.concatenate(parts)
+
+    def kkt_error(self, variables: Floats, multipliers: Floats, bound_multipliers: Floats) -> float:
+        """Largest entry of the Lagrangian's gradient, relative to the multipliers' size.
+
+        ``multipliers`` (rows,) with ``L = f + multipliers . g``; ``bound_multipliers`` (size,)
+        upper less lower. Scaled as IPOPT does (Waechter and Biegler 2006, eq 5): by the mean
+        multiplier where that is above 100.
+        """
+        residual = self.gradient(variables) + bound_multipliers
+        row, column = self.jacobian_pattern
+        np.add.at(residual, column, self.jacobian(variables) * multipliers[row])
+        total = np.abs(multipliers).sum() + np.abs(bound_multipliers).sum()
+        scale = max(100.0, total / max(1, len(multipliers) + len(bound_multipliers))) / 100.0
+        return float(np.abs(residual).max(initial=0.0) / scale)
