@@ -15,7 +15,7 @@ from solver.motion import HeadPosition
 from solver.promises import Promises, promise
 from solver.scene import Scene
 from solver.variables import NetworkState
-from solver.visibility import Sight, horizons, sight
+from solver.visibility import Sight, cosines, horizons, sight
 
 _HORIZON_MARGIN = float(np.sin(np.radians(0.3)))
 """A camera stays this far above a horizon: ray casting against facets is no more exact."""
@@ -26,10 +26,10 @@ _ABOUT_TO_BE_SEEN_DEG = 5.0
 
 @dataclass(frozen=True, eq=False)
 class Views:
-    """What is seen at one state: ``seen`` (n, p) and the promises made.
+    """What is seen at one state: ``seen`` (n, p) of the design points, and the promises made.
 
-    ``framed`` (n, p) are the points kept in frame and in focus: those seen, and those that a
-    small move might bring into view. Without the latter, every round would find new points
+    ``framed`` (n, q) are the check points kept in frame and in focus: those that face the
+    camera, or would after a small move. Without the latter, every round would find new points
     just outside the frame.
     """
 
@@ -67,12 +67,23 @@ def views(scene: Scene, state: NetworkState, earlier: Views | None = None) -> Vi
         if camera.fixed:
             seen[i] &= in_frame(camera, source.points_mm)
     fixed = np.array([c.fixed for c in scene.cameras])
-    framed = seen | (found.cosine > np.cos(np.radians(min(limit + _ABOUT_TO_BE_SEEN_DEG, 90.0))))
+    framed = _facing(scene, state, min(limit + _ABOUT_TO_BE_SEEN_DEG, 90.0))
     before = None
     if earlier is not None:
         framed, before = framed | earlier.framed, earlier.promises
     deficits = _deficits(scene, state, found, seen)
     return Views(seen, framed, promise(scene.limits.coverage.tiers, deficits, fixed, before))
+
+
+def _facing(scene: Scene, state: NetworkState, limit_deg: float) -> Bools:
+    """Check points (n, q) whose normals are within the limit of the ray, in any head position."""
+    source = scene.subject.check_points
+    least = np.cos(np.radians(limit_deg))
+    out = np.zeros((scene.count, len(source)), dtype=np.bool_)
+    for i, centre in enumerate(centres_mm(scene, state)):
+        for position in scene.visibility_positions:
+            out[i] |= cosines(source, position.eye_seen_by_head(centre)) > least
+    return out
 
 
 def _deficits(scene: Scene, state: NetworkState, found: Sight, seen: Bools) -> Floats:

@@ -61,7 +61,7 @@ class Programme:
     frozen: Floats
     soft: tuple[str, ...] = ()
     each: tuple[str, ...] = ()
-    price: float = 1.0
+    soft_prices: tuple[float, ...] = ()
     each_price: float = 1.0
 
     @property
@@ -83,8 +83,8 @@ class Programme:
     @cached_property
     def prices(self) -> Floats:
         """Price of each concession."""
-        single = len(self.soft)
-        return np.r_[np.full(single, self.price), np.full(self.concession_count - single, self.each_price)]
+        each = np.full(self.concession_count - len(self.soft), self.each_price)
+        return np.r_[np.array(self.soft_prices), each]
 
     @cached_property
     def bounds(self) -> tuple[Floats, Floats]:

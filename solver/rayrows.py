@@ -15,13 +15,13 @@ from solver.scene import Scene
 _INF = np.inf
 
 
-def _extremes(scene: Scene, seen: Bools) -> tuple[Ints, Floats]:
-    """Cameras (m,) and points (m, 3): the corners of what each free camera sees, head moved."""
+def _extremes(scene: Scene, framed: Bools) -> tuple[Ints, Floats]:
+    """Cameras (m,) and points (m, 3): the corners of what each free camera frames, head moved."""
     cameras, points = [], []
     for i, camera in enumerate(scene.cameras):
         if camera.fixed:
             continue
-        corners = scene.subject.design_points.points_mm[scene.hull_rows(seen[i])]
+        corners = scene.hull(framed[i])
         moved = np.concatenate([scene.scaled(p.points(corners)) for p in scene.framing_positions])
         cameras.append(np.full(len(moved), i))
         points.append(moved)

@@ -123,19 +123,19 @@ class Scene:
             (covers[id(c.camera)][0] / scale, covers[id(c.camera)][1] / scale) for c in self.cameras
         )
 
-    def hull_rows(self, seen: Bools) -> Ints:
-        """Indices of the corners of the convex hull of some design points.
+    def hull(self, framed: Bools) -> Floats:
+        """Corners (m, 3) in mm of the convex hull of some check points.
 
         Projections keep convex sets convex, so constraints on these corners hold for all.
         Flat or tiny sets are returned whole.
         """
-        rows = np.flatnonzero(seen)
-        if len(rows) < 8:
-            return rows
+        points = self.subject.check_points.points_mm[framed]
+        if len(points) < 8:
+            return points
         try:
-            return np.asarray(rows[ConvexHull(self.points[rows]).vertices])
+            return np.asarray(points[ConvexHull(points).vertices])
         except QhullError:
-            return rows
+            return points
 
 
 def camera_at(camera: Camera, name: str, pose: Pose, target_mm: Floats) -> RigCamera:

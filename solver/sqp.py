@@ -13,8 +13,8 @@ of Optimization, 2nd ed., section 14.4 (S l1 QP); second-order correction as the
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy import sparse
@@ -69,7 +69,7 @@ class Task:
 
     Rows of the families in ``each`` are broken one by one at the fixed ``each_price``: one that
     costs more than that is given up. The other families are priced by their worst row, and the
-    price rises until they hold.
+    price rises until they hold. ``weights`` make a breach of some families dearer than of others.
     """
 
     unknowns: Unknowns
@@ -78,6 +78,7 @@ class Task:
     bounds: tuple[Floats, Floats]
     each: tuple[str, ...] = ()
     each_price: float = 10.0
+    weights: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def families(self) -> tuple[str, ...]:
@@ -138,7 +139,7 @@ class _Run:
         blocks = tuple(r.block.take(c) for r, c in zip(task.rows, chosen, strict=True))
         return Programme(  # fmt: skip
             task.unknowns, task.cost, blocks, *task.bounds, self.values, task.families, task.each,
-            self.price, task.each_price,
+            tuple(self.price * task.weights.get(f, 1.0) for f in task.families), task.each_price,
         )
 
     @property
@@ -165,8 +166,11 @@ class _Run:
 
     def paid(self, breaches: dict[str, float]) -> float:
         """Price of the breaches."""
-        each = self.task.each
-        return sum((self.task.each_price if n in each else self.price) * b for n, b in breaches.items())
+        task = self.task
+        return sum(
+            b * (task.each_price if n in task.each else self.price * task.weights.get(n, 1.0))
+            for n, b in breaches.items()
+        )
 
     def merit(self, cost: float, breaches: dict[str, float]) -> float:
         """What a step must lower: cost and price of the breaches."""

@@ -1,0 +1,247 @@
+"""The job: a subject and the limits of a rig in, a design out."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from geometry.arrays import Floats
+from geometry.camera import Camera, RigCamera
+from geometry.errors import CancelledError, InputError
+from geometry.frames import Pose
+from geometry.subject import Subject
+from solver.diagnosis import conflicts
+from solver.limits import Limits
+from solver.polish import polish
+from solver.pool import StartJob, run_all
+from solver.progress import CancelToken, NeverCancelled, Progress, ProgressCallback, ignore_progress
+from solver.quality import evaluate
+from solver.result import Concession, Design, Quality, SolverReport, StartReport, Status
+from solver.rounds import MAX_ROUNDS, StartResult
+from solver.scene import Scene, camera_at
+from solver.starts import kmeans_start, strips
+
+ENGINE = "sequential quadratic programming with exact second derivatives (PIQP)"
+_EXPECTED_ROUNDS = 8
+
+
+@dataclass(frozen=True, eq=False)
+class Order:
+    """What is to be designed. See :func:`design` for the fields."""
+
+    subject: Subject
+    camera: Camera
+    limits: Limits
+    count: int
+    seed: int
+    starts: int
+    fixed: tuple[RigCamera, ...]
+    start: tuple[Pose, ...] | None
+
+    def __post_init__(self) -> None:
+        total = self.count + len(self.fixed)
+        views = max((t.views for t in self.limits.coverage.tiers), default=1)
+        given = None if self.start is None else len(self.start)
+        problems = (
+            (self.count < 1, "no-cameras", f"{self.count} cameras are to be placed", "ask for at least one"),
+            (self.starts < 1, "starts", f"{self.starts} starts are asked for", "ask for at least one start"),
+            (
+                views > total, "limits-contradict",
+                f"coverage asks for {views} views of each point, but there are only {total} cameras",
+                "ask for fewer views or more cameras",
+            ),
+            (
+                given is not None and given != self.count, "start-count",
+                f"{given} start poses are given for {self.count} cameras", "give one start pose per camera",
+            ),
+        )  # fmt: skip
+        for wrong, detail, problem, remedy in problems:
+            if wrong:
+                raise InputError(detail, problem, remedy)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the cameras to be placed: cam01, cam02, ..., passing over fixed ones."""
+        taken = {c.name for c in self.fixed}
+        fresh = (f"cam{k:02d}" for k in range(1, self.count + len(taken) + 1))
+        return tuple(n for n in fresh if n not in taken)[: self.count]
+
+    @property
+    def anchor(self) -> tuple[Pose, ...] | None:
+        """Poses about which Eq 8 bounds the cameras; without given ones, each start's own."""
+        if self.start is None:
+            return None
+        return (*(c.pose for c in self.fixed), *self.start)
+
+    def scene(self, cameras: tuple[RigCamera, ...]) -> Scene:
+        """The problem that starts from these cameras."""
+        everyone = (*self.fixed, *cameras)
+        anchor = self.anchor or tuple(c.pose for c in everyone)
+        return Scene(self.subject, everyone, self.limits, anchor)
+
+
+def design(
+    subject: Subject,
+    camera: Camera,
+    limits: Limits,
+    *,
+    count: int,
+    seed: int = 0,
+    starts: int = 8,
+    fixed: tuple[RigCamera, ...] = (),
+    start: tuple[Pose, ...] | None = None,
+    workers: int = 1,
+    progress: ProgressCallback = ignore_progress,
+    cancel: CancelToken | None = None,
+) -> Design:
+    """Place ``count`` cameras so that the subject is measured as exactly as the limits allow.
+
+    ``fixed`` cameras of an existing rig stay where they are and take part. ``start`` gives the
+    poses of the first start, about which Eq 8 bounds the cameras. The best feasible of
+    ``starts`` wins, worked on by ``workers`` processes; the result does not depend on their
+    number. When the limits contradict each other the nearest network is returned with status
+    ``infeasible`` and the conflicts named. Raises :class:`InputError` for orders that cannot be
+    understood and :class:`CancelledError` within a second of ``cancel`` being set.
+    """
+    order = Order(subject, camera, limits, count, seed, starts, fixed, start)
+    token = cancel or NeverCancelled()
+    began = time.monotonic()
+    tell = _Teller(progress, starts)
+    tell.stage("start", 0.0)
+    jobs = _jobs(order)
+    results = run_all(jobs, workers, tell.step, token)
+    tell.stage("choose", 0.9)
+    scores = []
+    for job, result in zip(jobs, results, strict=True):
+        if token.is_set():
+            raise CancelledError
+        scores.append(evaluate(subject, job.scene.placed(result.values), limits, job.scene.anchor))
+    best = min(range(len(jobs)), key=lambda k: (*_rank(scores[k]), k))
+    scene = jobs[best].scene
+    tell.stage("polish", 0.93)
+    values, quality, kkt, why, iterations = _finish(scene, results[best], scores[best], token)
+    found: tuple[Concession, ...] = ()
+    if not quality.feasible:
+        tell.stage("diagnose", 0.96)
+        found = conflicts(scene, values, token)
+    if token.is_set():
+        raise CancelledError
+    report = SolverReport(
+        engine=ENGINE,
+        status=_status(quality, kkt),
+        why_stopped=why,
+        kkt_error=kkt,
+        iterations=results[best].iterations + iterations,
+        rounds=results[best].rounds,
+        seed=seed,
+        seconds=time.monotonic() - began,
+        starts=tuple(_start_report(j, r, s) for j, r, s in zip(jobs, results, scores, strict=True)),
+        conflicts=found,
+    )
+    begin = evaluate(subject, scene.cameras, limits, scene.anchor)
+    tell.stage("done", 1.0)
+    return Design(scene.placed(values), quality, scene.cameras, begin, limits, report)
+
+
+class _Teller:
+    """Turns the steps of all starts into one fraction that never falls."""
+
+    def __init__(self, progress: ProgressCallback, starts: int) -> None:
+        self._progress = progress
+        self._done = [0.0] * starts
+        self._fraction = 0.0
+
+    def stage(self, name: str, fraction: float) -> None:
+        self._fraction = max(self._fraction, fraction)
+        self._progress(Progress(name, self._fraction))
+
+    def step(self, start: int, round_: int, iteration: int, cost: float, breach: float) -> None:
+        # Rounds are not known in advance; a start creeps towards its end without passing it.
+        share = 1.0 - np.exp(-2.0 * (round_ + iteration / 1e3) / min(_EXPECTED_ROUNDS, MAX_ROUNDS))
+        self._done[start] = max(self._done[start], float(share))
+        self._fraction = max(self._fraction, 0.9 * sum(self._done) / len(self._done))
+        self._progress(Progress("solve", self._fraction, start, iteration, cost, breach))
+
+
+def _jobs(order: Order) -> list[StartJob]:
+    """The given or the k-means start, the best strip, then jittered k-means starts."""
+    subject, camera, limits, names = order.subject, order.camera, order.limits, order.names
+    jobs: list[StartJob] = []
+
+    def add(kind: str, cameras: tuple[RigCamera, ...]) -> None:
+        jobs.append(StartJob(len(jobs), kind, order.scene(cameras), order.seed))
+
+    if order.start is not None:
+        add("given", tuple(camera_at(camera, n, p, _target(subject)) for n, p in zip(names, order.start, strict=True)))
+        while len(jobs) < order.starts:
+            add("given, jittered", _jittered(order, len(jobs)))
+        return jobs
+    add("k-means", kmeans_start(subject, camera, limits, names, order.seed))
+    if order.starts > 1 and len(names) > 1:
+        add("strip", best_strip(subject, camera, limits, names))
+    while len(jobs) < order.starts:
+        index = len(jobs)
+        add("k-means, jittered", kmeans_start(subject, camera, limits, names, order.seed + 1000 * index, 1.0))
+    return jobs
+
+
+def _target(subject: Subject) -> Floats:
+    return subject.design_points.centroid_mm
+
+
+def _jittered(order: Order, index: int) -> tuple[RigCamera, ...]:
+    """The given poses, each turned by about 6 degrees and moved by 10 % of its distance."""
+    rng = np.random.default_rng([order.seed, index])
+    out = []
+    for name, pose in zip(order.names, order.start or (), strict=True):
+        distance = float(np.linalg.norm(pose.position_rig_mm - _target(order.subject)))
+        position = pose.position_rig_mm + 0.1 * distance * rng.normal(size=3)
+        angles = pose.omega_phi_kappa_deg + 6.0 * rng.normal(size=3)
+        out.append(camera_at(order.camera, name, Pose.from_omega_phi_kappa(position, angles), _target(order.subject)))
+    return tuple(out)
+
+
+def best_strip(
+    subject: Subject, camera: Camera, limits: Limits, names: tuple[str, ...]
+) -> tuple[RigCamera, ...]:
+    """The conventional strip that meets the limits best, and at the least cost among those."""
+    options = strips(subject, camera, limits, names)
+    return min(options, key=lambda cameras: _rank(evaluate(subject, cameras, limits)))
+
+
+def _rank(quality: Quality) -> tuple[float, float]:
+    """Feasible before infeasible by relative breach, then by cost."""
+    breach = sum(max(0.0, -r.slack) / max(abs(r.limit), 1e-3) for r in quality.violated)
+    return breach, quality.cost_mm2
+
+
+def _finish(
+    scene: Scene, result: StartResult, quality: Quality, cancel: CancelToken
+) -> tuple[Floats, Quality, float, str, int]:
+    """Bring the winner to the last digit, unless that would cost it a limit."""
+    outcome = polish(scene, result.values, cancel)
+    polished = evaluate(scene.subject, scene.placed(outcome.values), scene.limits, scene.anchor)
+    if outcome.values is not result.values and _rank(polished) <= _rank(quality):
+        return outcome.values, polished, outcome.kkt_error, outcome.why, outcome.iterations
+    return result.values, quality, result.outcome.kkt_error, result.why, 0
+
+
+def _status(quality: Quality, kkt: float) -> Status:
+    if not quality.feasible:
+        return Status.INFEASIBLE
+    return Status.CONVERGED if kkt < 1e-4 else Status.STOPPED
+
+
+def _start_report(job: StartJob, result: StartResult, quality: Quality) -> StartReport:
+    return StartReport(
+        index=job.index,
+        kind=job.kind,
+        feasible=quality.feasible,
+        cost_mm2=quality.cost_mm2,
+        violation=_rank(quality)[0],
+        iterations=result.iterations,
+        rounds=result.rounds,
+        why_stopped=result.why,
+    )

@@ -1,0 +1,135 @@
+"""Starts in parallel processes, one BLAS thread each, with progress and cancel."""
+
+from __future__ import annotations
+
+import multiprocessing as mp
+import os
+import threading
+from collections.abc import Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+from threadpoolctl import threadpool_limits
+
+from geometry.errors import CancelledError
+from solver.progress import CancelToken
+from solver.rounds import Report, StartResult, run_start
+from solver.scene import Scene
+
+_BLAS_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+_POLL_S = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class StartJob:
+    """One start to be optimised. Picklable, so that any executor may run it."""
+
+    index: int
+    kind: str
+    scene: Scene
+    seed: int
+
+
+
+@contextmanager
+def _single_threaded_children() -> Iterator[None]:
+    """BLAS reads its thread count when it is loaded, so children must be born with it set."""
+    before = {name: os.environ.get(name) for name in _BLAS_VARIABLES}
+    os.environ.update(dict.fromkeys(_BLAS_VARIABLES, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value
+
+
+_channel: tuple[Any, Any] | None = None
+
+
+def _begin(messages: Any, cancelled: Any) -> None:
+    """Set up a worker: its channel, and its end when its parent dies."""
+    global _channel  # noqa: PLW0603 - a pool's initializer has no other way to hand things over
+    _channel = (messages, cancelled)
+    parent = mp.parent_process()
+    if parent is not None:
+        threading.Thread(target=_die_with, args=(parent,), daemon=True).start()
+
+
+def _die_with(parent: Any) -> None:
+    parent.join()
+    os._exit(1)
+
+
+def solve(job: StartJob, report: Report, cancel: CancelToken) -> StartResult:
+    """Run one start on one BLAS thread, so that it gives the same bits wherever it runs."""
+    with threadpool_limits(1):
+        return run_start(job.scene, report, cancel, job.seed)
+
+
+def _solve_in_worker(job: StartJob) -> StartResult:
+    if _channel is None:
+        raise RuntimeError("the worker was not set up")
+    messages, cancelled = _channel
+
+    def report(round_: int, iteration: int, cost: float, breach: float) -> None:
+        messages.put((job.index, round_, iteration, cost, breach))
+
+    return solve(job, report, cancelled)
+
+
+class Listener:
+    """Receives ``(start, round, iteration, cost, violation)`` of all starts."""
+
+    def __call__(self, start: int, round_: int, iteration: int, cost: float, breach: float) -> None:
+        """Take note."""
+
+
+def run_all(jobs: list[StartJob], workers: int, listen: Listener, cancel: CancelToken) -> list[StartResult]:
+    """Results of all jobs in their order, whatever the number of workers.
+
+    Raises :class:`CancelledError` when ``cancel`` is set before all are done.
+    """
+    if workers <= 1 or len(jobs) == 1:
+        return _run_here(jobs, listen, cancel)
+    context = mp.get_context("spawn")
+    messages, cancelled = context.Queue(), context.Event()
+    with _single_threaded_children():
+        pool = ProcessPoolExecutor(min(workers, len(jobs)), context, _begin, (messages, cancelled))
+        try:
+            futures = [pool.submit(_solve_in_worker, job) for job in jobs]
+            _attend(futures, messages, cancelled, listen, cancel)
+            return [f.result() for f in futures]
+        finally:
+            cancelled.set()
+            pool.shutdown(wait=True, cancel_futures=True)
+            messages.close()
+
+
+def _run_here(jobs: list[StartJob], listen: Listener, cancel: CancelToken) -> list[StartResult]:
+    out = []
+    for job in jobs:
+        out.append(solve(job, lambda *step, index=job.index: listen(index, *step), cancel))
+        if cancel.is_set():
+            raise CancelledError
+    return out
+
+
+def _attend(
+    futures: list[Future[StartResult]], messages: Any, cancelled: Any, listen: Listener, cancel: CancelToken
+) -> None:
+    """Pass on progress until all are done or the work is cancelled."""
+    pending = set(futures)
+    while pending:
+        done, pending = wait(pending, timeout=_POLL_S, return_when=FIRST_COMPLETED)
+        while not messages.empty():
+            listen(*messages.get())
+        for future in done:
+            future.result()
+        if cancel.is_set():
+            cancelled.set()
+            raise CancelledError

@@ -1,0 +1,171 @@
+"""Every figure of a given network: what ``evaluate`` and ``design`` both report."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from geometry.arrays import Bools, Floats
+from geometry.camera import RigCamera
+from geometry.errors import InputError
+from geometry.frames import Pose
+from geometry.optics import blur_disk_mm, depth_of_field_mm, ground_sample_distance_mm
+from geometry.subject import Subject
+from solver.constrainttable import constraint_table
+from solver.coverage import in_frame
+from solver.information import normal_matrices
+from solver.limits import Limits
+from solver.motion import HeadPosition
+from solver.result import CameraTable, CoverageShare, PointTable, Quality
+from solver.scene import Scene
+from solver.visibility import sight
+
+
+@dataclass(frozen=True, eq=False)
+class Sightings:
+    """What the cameras see of the check points in one head position, each (n, q).
+
+    ``visible``: facing with a free line of sight; ``framed``: visible and in frame; ``sharp``:
+    framed and in focus; ``cosine`` of the angle of incidence; ``depth_mm`` along the axis.
+    """
+
+    visible: Bools
+    framed: Bools
+    sharp: Bools
+    cosine: Floats
+    depth_mm: Floats
+
+    @classmethod
+    def of(cls, scene: Scene, position: HeadPosition) -> Sightings:
+        """Cast all rays with the head in one position."""
+        source, occluder = scene.subject.check_points, scene.subject.occluder
+        centres = np.stack([c.pose.position_rig_mm for c in scene.cameras])
+        found = sight(source, occluder, centres, scene.limits.incidence.ray_max_deg, (position,))
+        points = position.points(source.points_mm)
+        framed, sharp, depth = found.seen.copy(), found.seen.copy(), np.empty(found.seen.shape)
+        for i, camera in enumerate(scene.cameras):
+            depth[i] = camera.pose.to_camera(points)[:, 2]
+            framed[i] &= in_frame(camera, points)
+            sharp[i] = framed[i] & is_sharp(camera, depth[i])
+        return cls(found.seen, framed, sharp, found.cosine, depth)
+
+
+def is_sharp(camera: RigCamera, depth_mm: Floats) -> Bools:
+    """Whether points at the given depths are within the circle of confusion, (n,)."""
+    kind = camera.camera
+    with np.errstate(divide="ignore", invalid="ignore"):
+        blur = blur_disk_mm(depth_mm, camera.focus_distance_mm, kind.focal_length_mm, kind.f_number)
+    # A micrometre of a micrometre: what rounding does to a point exactly on the limit.
+    return np.asarray((depth_mm > 0.0) & (blur <= kind.circle_of_confusion_mm * (1.0 + 1e-6)))
+
+
+def evaluate(
+    subject: Subject, cameras: tuple[RigCamera, ...], limits: Limits, anchor: tuple[Pose, ...] | None = None
+) -> Quality:
+    """Score any given network.
+
+    ``anchor`` are the poses about which Eq 8 bounds the cameras; without it those bounds are
+    not judged. Raises :class:`InputError` when there are no cameras or two share a name.
+    """
+    if not cameras:
+        raise InputError("no-cameras", "there are no cameras to evaluate", "give at least one camera")
+    names = [c.name for c in cameras]
+    if len(set(names)) < len(names):
+        raise InputError("camera-names", "two cameras have the same name", "give every camera its own name")
+    scene = Scene(subject, cameras, limits, anchor)
+    found = [Sightings.of(scene, position) for position in scene.visibility_positions]
+    rest = found[0]
+    points = _points(scene, rest)
+    norms = np.linalg.norm(points.covariance_mm2, axis=(1, 2))
+    seen = int(rest.visible.sum())
+    coverage = _coverage(scene, found)
+    return Quality(
+        cost_mm2=float(norms.mean()),
+        sigma_median_mm=float(np.median(points.sigma_mm)),
+        sigma_p95_mm=float(np.percentile(points.sigma_mm, 95.0)),
+        sigma_max_mm=float(points.sigma_mm.max()),
+        coverage=coverage,
+        in_focus_share=float(rest.sharp.sum() / max(1, int(rest.framed.sum()))),
+        in_frame_share=float(rest.framed.sum() / max(1, seen)),
+        base_height=base_height_table(cameras, subject.design_points.centroid_mm),
+        convergence_deg=convergence_table(cameras, subject.design_points.centroid_mm),
+        cameras=_cameras(scene, rest),
+        points=points,
+        constraints=constraint_table(scene, [f.visible for f in found], coverage),
+    )
+
+
+def _coverage(scene: Scene, found: list[Sightings]) -> tuple[CoverageShare, ...]:
+    """Shares of points in so many views or more, at the worst head position."""
+    counts = [f.framed.sum(axis=0) for f in found]
+    most = max([3, *(t.views for t in scene.limits.coverage.tiers)])
+    return tuple(
+        CoverageShare(v, min(float((c >= v).mean()) for c in counts)) for v in range(1, min(most, scene.count) + 1)
+    )
+
+
+def _points(scene: Scene, rest: Sightings) -> PointTable:
+    source = scene.subject.check_points
+    weight = rest.framed * scene.ray_weight[:, None]
+    state = scene.unknowns.state(scene.start_values())
+    normal = normal_matrices(state, scene.scaled(source.points_mm), weight, scene.prior)
+    covariance = np.linalg.inv(normal) * scene.length_mm**2
+    longest = np.linalg.eigvalsh(covariance)[:, -1]
+    views, sharp = rest.framed.sum(axis=0), rest.sharp.sum(axis=0)
+    return PointTable(source, covariance, np.sqrt(longest), views, sharp)
+
+
+def base_height_table(cameras: tuple[RigCamera, ...], centroid_mm: Floats) -> Floats:
+    """Base over mean distance to the centroid for all pairs, (n, n) with zeros on the diagonal."""
+    centres = np.stack([c.pose.position_rig_mm for c in cameras])
+    base = np.linalg.norm(centres[:, None] - centres[None], axis=2)
+    height = np.linalg.norm(centres - centroid_mm, axis=1)
+    return np.asarray(2.0 * base / (height[:, None] + height[None]))
+
+
+def convergence_table(cameras: tuple[RigCamera, ...], centroid_mm: Floats) -> Floats:
+    """Angle at the centroid between the rays to two cameras, degrees, (n, n)."""
+    away = np.stack([c.pose.position_rig_mm for c in cameras]) - centroid_mm
+    away /= np.linalg.norm(away, axis=1, keepdims=True)
+    angles = np.degrees(np.arccos(np.clip(away @ away.T, -1.0, 1.0)))
+    np.fill_diagonal(angles, 0.0)
+    return np.asarray(angles)
+
+
+def _cameras(scene: Scene, rest: Sightings) -> CameraTable:
+    n = scene.count
+    gsd, incidence, depth = np.full((n, 3), np.nan), np.full((n, 2), np.nan), np.full((n, 2), np.nan)
+    focus = np.empty((n, 2))
+    for i, c in enumerate(scene.cameras):
+        kind = c.camera
+        focus[i] = depth_of_field_mm(
+            c.focus_distance_mm, kind.focal_length_mm, kind.f_number, kind.circle_of_confusion_mm
+        )
+        rows = rest.framed[i]
+        if not rows.any():
+            continue
+        z = rest.depth_mm[i, rows]
+        pixel = ground_sample_distance_mm(z, kind.focal_length_px)
+        angle = np.degrees(np.arccos(np.clip(rest.cosine[i, rows], -1.0, 1.0)))
+        gsd[i] = pixel.min(), pixel.mean(), pixel.max()
+        incidence[i] = angle.mean(), angle.max()
+        depth[i] = z.min(), z.max()
+    centres = np.stack([c.pose.position_rig_mm for c in scene.cameras])
+    distance = np.linalg.norm(centres - scene.origin_mm, axis=1)
+    return CameraTable(
+        rest.framed.sum(axis=1), gsd, incidence, depth, focus, distance, nearest_body_mm(scene)
+    )
+
+
+def nearest_body_mm(scene: Scene) -> Floats:
+    """Clearance (n,) of each body's sphere cover to the nearest other one, infinite if alone."""
+    centres = [c.pose.to_rig(o * scene.length_mm) for c, (o, _) in zip(scene.cameras, scene.spheres, strict=True)]
+    radii = [r * scene.length_mm for _, r in scene.spheres]
+    out = np.full(scene.count, np.inf)
+    for i in range(scene.count):
+        for k in range(i):
+            gap = np.linalg.norm(centres[i][:, None] - centres[k][None], axis=2)
+            least = float((gap - radii[i][:, None] - radii[k][None]).min())
+            out[i], out[k] = min(out[i], least), min(out[k], least)
+    return out
