@@ -30,27 +30,26 @@ class Candidates:
         """A block of which every row is always worked on."""
         return cls(block, np.zeros(block.rows, dtype=np.int64), block.rows)
 
-    def choose(self, state: NetworkState, held: Ints) -> Ints:
-        """``held`` rows, with the tightest of each group and those that are violated added."""
+    def choose(self, state: NetworkState, held: Ints, reach: float) -> Ints:
+        """``held`` rows, with the tightest of each group and those that are violated added.
+
+        Rows with a slack beyond ``reach`` are left out: no step of that length gets there.
+        """
         if self.keep >= self.block.rows:
             return np.arange(self.block.rows)
         slack = self.block.slack(state)
-        order = np.lexsort((slack, self.group))
-        group = self.group[order]
-        first = np.flatnonzero(np.r_[True, group[1:] != group[:-1]])
-        rank = np.arange(len(order)) - np.repeat(first, np.diff(np.r_[first, len(order)]))
-        # Of many violated rows of a group the worst few stand for the rest in this step.
-        taken = (rank < self.keep) | ((slack[order] < -VIOLATED) & (rank < 4 * self.keep))
-        chosen = np.zeros(len(order), dtype=np.bool_)
-        chosen[order[taken]] = True
+        near = np.flatnonzero(slack < reach)
+        order = near[np.lexsort((slack[near], self.group[near]))]
+        chosen = np.zeros(len(slack), dtype=np.bool_)
         chosen[held] = True
+        if len(order):
+            group = self.group[order]
+            first = np.flatnonzero(np.r_[True, group[1:] != group[:-1]])
+            rank = np.arange(len(order)) - np.repeat(first, np.diff(np.r_[first, len(order)]))
+            # Of many violated rows of a group the worst few stand for the rest in this step.
+            taken = (rank < self.keep) | ((slack[order] < -VIOLATED) & (rank < 4 * self.keep))
+            chosen[order[taken]] = True
         return np.flatnonzero(chosen)
-
-    def missed(self, state: NetworkState, held: Ints) -> bool:
-        """Whether a row outside ``held`` is violated."""
-        out = self.block.slack(state) < -VIOLATED
-        out[held] = False
-        return bool(out.any())
 
 
 def grouped(*keys: Ints | Floats) -> Ints:

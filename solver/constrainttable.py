@@ -41,7 +41,8 @@ def row(
     size = max(abs(scale), 1e-12)
     # An equality binds by its nature.
     active = sense is Sense.EQUAL or slack < BINDING * size
-    return ConstraintRow(name, value, limit, sense, unit, slack, active, slack >= -SATISFIED * size)
+    met = slack >= -SATISFIED * size
+    return ConstraintRow(name, float(value), float(limit), sense, unit, float(slack), bool(active), bool(met))
 
 
 def constraint_table(

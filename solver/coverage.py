@@ -21,7 +21,9 @@ _HORIZON_MARGIN = float(np.sin(np.radians(0.3)))
 """A camera stays this far above a horizon: ray casting against facets is no more exact."""
 
 
-_ABOUT_TO_BE_SEEN_DEG = 5.0
+_ABOUT_TO_BE_SEEN_DEG = 15.0
+"""How far beyond the limit of incidence points are framed: about what a camera swings by in a
+round. With less, round after round finds new points just outside the frame."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +38,13 @@ class Views:
     seen: Bools
     framed: Bools
     promises: Promises
+
+    def among(self, scene: Scene, chosen: Ints) -> Views:
+        """The same views of a scene of whose design points these were the ``chosen`` ones."""
+        seen = np.zeros((scene.count, len(scene.subject.design_points)), dtype=np.bool_)
+        seen[:, chosen] = self.seen
+        promises = Promises(self.promises.camera, chosen[self.promises.point], self.promises.kept)
+        return Views(seen, self.framed, promises)
 
 
 def centres_mm(scene: Scene, state: NetworkState) -> Floats:

@@ -26,22 +26,6 @@ class Cost(Protocol):
         """Its second derivative, (7 n, 7 n)."""
 
 
-class NoCost:
-    """The cost that is zero: for programmes that only seek a feasible network."""
-
-    def value(self, state: NetworkState) -> float:  # noqa: ARG002 - the protocol's signature
-        """Zero."""
-        return 0.0
-
-    def gradient(self, state: NetworkState) -> Floats:
-        """Zeros (7 n,)."""
-        return np.zeros(7 * len(state.centre))
-
-    def hessian(self, state: NetworkState) -> Floats:
-        """Zeros (7 n, 7 n)."""
-        return np.zeros((7 * len(state.centre),) * 2)
-
-
 @dataclass(frozen=True, eq=False)
 class Programme:
     """Minimise ``cost + prices . concessions`` subject to rows and bounds.
@@ -165,21 +149,15 @@ class Programme:
         rows, columns = np.tril_indices(len(self.free))
         return rows, columns
 
-    def pack(self, values: Floats, concessions: Floats | None = None) -> Floats:
-        """Variables of all unknowns (7 n,) and concessions."""
-        extra = np.zeros(self.concession_count) if concessions is None else concessions
-        return np.r_[values[self.free], extra]
+    def pack(self, values: Floats) -> Floats:
+        """Variables of all unknowns (7 n,), with no concessions."""
+        return np.r_[values[self.free], np.zeros(self.concession_count)]
 
     def all_unknowns(self, variables: Floats) -> Floats:
         """All unknowns (7 n,) of the variables."""
         full = self.frozen.copy()
         full[self.free] = variables[: len(self.free)]
         return full
-
-    def concessions(self, variables: Floats) -> dict[str, float]:
-        """How far each soft family gave way."""
-        given = variables[len(self.free) : len(self.free) + len(self.soft)]
-        return dict(zip(self.soft, map(float, given), strict=True))
 
     def state(self, variables: Floats) -> NetworkState:
         """The network at the variables, remembered for the calls that follow at the same place."""
@@ -265,17 +243,3 @@ class Programme:
             part = known[id(block)][rows]
             parts.append(part if sign == 0.0 else np.where(part * sign < 0.0, part, 0.0))
         return np.concatenate(parts)
-
-    def kkt_error(self, variables: Floats, multipliers: Floats, bound_multipliers: Floats) -> float:
-        """Largest entry of the Lagrangian's gradient, relative to the multipliers' size.
-
-        ``multipliers`` (rows,) with ``L = f + multipliers . g``; ``bound_multipliers`` (size,)
-        upper less lower. Scaled as IPOPT does (Waechter and Biegler 2006, eq 5): by the mean
-        multiplier where that is above 100.
-        """
-        residual = self.gradient(variables) + bound_multipliers
-        row, column = self.jacobian_pattern
-        np.add.at(residual, column, self.jacobian(variables) * multipliers[row])
-        total = np.abs(multipliers).sum() + np.abs(bound_multipliers).sum()
-        scale = max(100.0, total / max(1, len(multipliers) + len(bound_multipliers))) / 100.0
-        return float(np.abs(residual).max(initial=0.0) / scale)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from geometry.arrays import Floats
+from geometry.arrays import Floats, Ints
 from solver.bodyrows import body_rows
 from solver.candidates import Candidates
 from solver.coverage import Cuts, Views, cuts_for_hidden, opening_directions, views
@@ -89,6 +89,7 @@ class _Work:
     round: int = 0
     promise_price: float = 10.0
     cuts: Cuts = field(default_factory=Cuts.none)
+    seen: Views | None = None
 
     def watch(self, iteration: int, cost: float, breach: float) -> bool:
         self.report(self.round, self.iterations + iteration, cost, breach)
@@ -163,10 +164,12 @@ def _solve_round(work: _Work, values: Floats, seen: Views, rows: list[Candidates
     return outcome
 
 
-def _level(work: _Work, values: Floats, gain: float, radius: float) -> tuple[Floats, Merit, Outcome, str]:
+def _level(
+    work: _Work, values: Floats, gain: float, radius: float, earlier: Views | None
+) -> tuple[Floats, Merit, Outcome, str]:
     """Rounds on one set of points until they settle; the best network of all rounds."""
     scene = work.scene
-    seen = views(scene, scene.unknowns.state(values))
+    seen = views(scene, scene.unknowns.state(values), earlier)
     best: tuple[Floats, Merit, Outcome] | None = None
     why = f"the limit of {MAX_ROUNDS} rounds was reached"
     for _ in range(MAX_ROUNDS):
@@ -189,23 +192,25 @@ def _level(work: _Work, values: Floats, gain: float, radius: float) -> tuple[Flo
             break
         values, radius = outcome.values, 0.3 * FIRST_RADIUS
     assert best is not None  # noqa: S101 - the loop runs at least once
+    work.seen = seen
     return (*best, why)
 
 
 def _worth_another(before: Merit, now: Merit) -> bool:
+    # While a limit is broken, or was until now, rounds still bring points into the frame.
     if not now.feasible or not before.feasible:
-        return now.better_than(before)
+        return True
     return now.cost < before.cost * (1.0 - SETTLED)
 
 
-def thinned(scene: Scene, seed: int) -> Scene:
-    """The same scene with fewer design points: a random choice, and the corners of their hull."""
+def thinned(scene: Scene, seed: int) -> tuple[Scene, Ints] | None:
+    """The same scene with a random choice of its design points, and which; None if it has few."""
     count = len(scene.subject.design_points)
     if count <= 2 * THINNED_POINTS:
-        return scene
-    chosen = np.random.default_rng(seed).choice(count, THINNED_POINTS, replace=False)
-    points = scene.subject.design_points.subset(np.sort(chosen))
-    return replace(scene, subject=replace(scene.subject, design_points=points), origin=scene.origin_mm)
+        return None
+    chosen = np.sort(np.random.default_rng(seed).choice(count, THINNED_POINTS, replace=False))
+    points = scene.subject.design_points.subset(chosen)
+    return replace(scene, subject=replace(scene.subject, design_points=points), origin=scene.origin_mm), chosen
 
 
 def run_start(scene: Scene, report: Report, cancel: CancelToken, seed: int = 0) -> StartResult:
@@ -214,13 +219,16 @@ def run_start(scene: Scene, report: Report, cancel: CancelToken, seed: int = 0) 
     bounds = unknown_bounds(scene, scene.anchor_values())
     state = scene.unknowns.state(values)
     scale = covariance_cost(scene, views(scene, state)).typical(state)
+    iterations, rounds, radius, earlier = 0, 0, FIRST_RADIUS, None
     coarse = thinned(scene, seed)
-    iterations = rounds = 0
-    radius = FIRST_RADIUS
-    if coarse is not scene:
-        work = _Work(coarse, bounds, report, cancel, scale)
-        values, _, outcome, why = _level(work, values, 1e-3, radius)
+    if coarse is not None:
+        work = _Work(coarse[0], bounds, report, cancel, scale)
+        values, _, outcome, why = _level(work, values, 1e-3, radius, None)
         iterations, rounds, radius = work.iterations, work.round, 0.3 * FIRST_RADIUS
-    work = _Work(scene, bounds, report, cancel, scale, iterations, rounds)
-    values, found, outcome, why = _level(work, values, 1e-5, radius)
+        earlier = None if work.seen is None else work.seen.among(scene, coarse[1])
+    if not cancel.is_set():
+        work = _Work(scene, bounds, report, cancel, scale, iterations, rounds)
+        values, found, outcome, why = _level(work, values, 1e-4, radius, earlier)
+    else:
+        found = merit(scene, values, views(scene, state), [], bounds)
     return StartResult(values, found, outcome, work.iterations, work.round, outcome.stopped, why)

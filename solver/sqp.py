@@ -14,7 +14,7 @@ of Optimization, 2nd ed., section 14.4 (S l1 QP); second-order correction as the
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy import sparse
@@ -33,9 +33,13 @@ FIRST_RADIUS = 0.2
 LARGEST_RADIUS = 0.5
 SMALLEST_RADIUS = 1e-9
 FIRST_PRICE = 10.0
+LEAST_PRICE = 0.1
 LARGEST_PRICE = 1e6
 FEASIBLE = 1e-8
-_PATIENCE = 4
+REACH = 2.0
+"""Rows change by at most about this much per unit of the trust radius."""
+
+_PATIENCE = 3
 _FLAT = 0.01
 """Least curvature of a model, in start costs per squared length scale: the turn about the
 optical axis is almost free, and without any curvature such directions wander."""
@@ -106,6 +110,7 @@ class _Step:
     move: Floats
     multipliers: Floats
     predicted: float
+    left: float
 
 
 class _Run:
@@ -124,7 +129,7 @@ class _Run:
             mine[: len(before)] = before
         self.breaches = task.breaches(self.values)
         self.gains: list[float] = []
-        self.history = [self.worst]
+        self.refused = 0
         self.cost = task.cost.value(task.unknowns.state(self.values))
 
     def programme(self) -> Programme:
@@ -132,7 +137,7 @@ class _Run:
         task = self.task
         state = task.unknowns.state(self.values)
         chosen = [
-            r.choose(state, np.union1d(h, np.flatnonzero(m)))
+            r.choose(state, np.union1d(h, np.flatnonzero(m)), REACH * self.radius)
             for r, h, m in zip(task.rows, self.held, self.multipliers, strict=True)
         ]
         self.chosen = chosen
@@ -157,12 +162,22 @@ class _Run:
             if r.block.family in self.task.each
         )
 
-    def raise_price(self) -> None:
-        """Ask more for a breach that has not halved within the last few steps."""
-        self.history.append(self.worst)
-        if len(self.history) > _PATIENCE and self.worst > max(FEASIBLE, 0.5 * self.history[-_PATIENCE]):
-            self.price = min(5.0 * self.price, LARGEST_PRICE)
-            self.history = [self.worst]
+    def reprice(self, breach_before: float, left: float) -> None:
+        """Keep the price of a breach above what breaking a limit is worth, but not far above.
+
+        ``left`` is the breach that the last quadratic programme chose to leave. A price that is
+        much too high makes every step creep along curved limits; one too low breaks them.
+        """
+        self.refused = self.refused + 1 if breach_before > 1e-6 and left > 0.5 * breach_before else 0
+        if self.refused >= _PATIENCE:
+            self.price, self.refused = min(5.0 * self.price, LARGEST_PRICE), 0
+        elif self.worst < 1e-5:
+            worth: dict[str, float] = {}
+            for r, m in zip(self.task.rows, self.multipliers, strict=True):
+                worth[r.block.family] = worth.get(r.block.family, 0.0) + float(np.abs(m).sum())
+            needed = max((worth[f] / self.task.weights.get(f, 1.0) for f in self.task.families), default=0.0)
+            if self.price > 4.0 * needed:
+                self.price = max(2.0 * needed, LEAST_PRICE)
 
     def paid(self, breaches: dict[str, float]) -> float:
         """Price of the breaches."""
@@ -179,7 +194,7 @@ class _Run:
     def hold_violated(self, values: Floats) -> None:
         """Work on what is violated at a place that was tried."""
         state = self.task.unknowns.state(values)
-        self.held = [r.choose(state, h) for r, h in zip(self.task.rows, self.held, strict=True)]
+        self.held = [r.choose(state, h, REACH * self.radius) for r, h in zip(self.task.rows, self.held, strict=True)]
 
     def remember(self, programme: Programme, multipliers: Floats) -> None:
         """Spread the multipliers of the working set over the candidate rows."""
@@ -235,7 +250,8 @@ def _quadratic_step(
     move = np.clip(result.x[:free], box_low[:free], box_high[:free])
     give = float(gradient[free:] @ np.maximum(result.x[free:], 0.0))
     predicted = run.paid(run.breaches) - float(gradient[:free] @ move + 0.5 * move @ model @ move) - give
-    return _Step(move, np.asarray(result.z_u - result.z_l), predicted)
+    left = float(result.x[free : free + len(programme.soft)].max(initial=0.0))
+    return _Step(move, np.asarray(result.z_u - result.z_l), predicted, left)
 
 
 def minimise(
@@ -273,7 +289,7 @@ def minimise(
         if kkt < tolerance and worst < FEASIBLE and not run.unpriced:
             converged, why = True, "the optimality conditions hold to the tolerance"
             break
-        if worst < FEASIBLE and len(run.gains) > 2 and sum(run.gains[-3:]) < gain_tolerance:
+        if worst < max(FEASIBLE, 0.01 * gain_tolerance) and _idle(run.gains, gain_tolerance):
             converged, why = True, f"three steps together gained less than {gain_tolerance:g} of the cost"
             break
         if run.radius < SMALLEST_RADIUS:
@@ -295,6 +311,11 @@ def minimise(
     return Outcome(run.values, run.multipliers, kkt, run.worst, iteration, converged, stopped, why)
 
 
+def _idle(gains: list[float], tolerance: float) -> bool:
+    """Whether the last three steps together gained less than ``tolerance``."""
+    return len(gains) > 2 and sum(gains[-3:]) < tolerance
+
+
 def _try(
     run: _Run, programme: Programme, step: _Step, model: Floats, gradient: Floats, jacobian: sparse.csc_matrix
 ) -> None:
@@ -314,10 +335,11 @@ def _try(
         ratio = (gain + noise) / (step.predicted + noise)
         if ratio > 0.05:
             reach = run.reach = float(np.abs(step.move).max(initial=0.0))
+            worst = run.worst
             run.values, run.cost, run.breaches = trial, cost, breaches
             run.gains.append(gain)
-            run.raise_price()
             run.remember(programme, step.multipliers)
+            run.reprice(worst, step.left)
             if ratio > 0.7 and reach > 0.8 * run.radius:
                 run.radius = min(2.0 * run.radius, LARGEST_RADIUS)
             elif ratio < 0.25:
@@ -328,7 +350,7 @@ def _try(
             shifted = programme.values(programme.pack(trial)) - jacobian @ np.r_[step.move, np.zeros(programme.concession_count)]
             corrected = _quadratic_step(run, programme, model, gradient, jacobian, shifted)
             if corrected is not None:
-                step = _Step(corrected.move, corrected.multipliers, step.predicted)
+                step = replace(corrected, predicted=step.predicted)
                 continue
         break
     run.radius = 0.3 * min(run.radius, float(np.abs(step.move).max(initial=0.0)) + 1e-12)

@@ -1,4 +1,4 @@
-"""Solvers of a programme: IPOPT, and SciPy's SLSQP as an independent second opinion."""
+"""Other solvers for the same programme: second opinions for tests, rivals for benchmarks."""
 
 from __future__ import annotations
 
@@ -121,7 +121,7 @@ def solve_ipopt(
     inside = np.clip(start, low, high)
     x, _, status = problem.solve(inside, mult_g=multipliers, mult_x_L=below, mult_x_U=above)
     x = np.asarray(x)
-    kkt = programme.kkt_error(x, multipliers, above - below)
+    kkt = kkt_error(programme, x, multipliers, above - below)
     why = _WORDS.get(status, f"IPOPT ended with status {status}")
     stopped = bool(reached["stopped"])
     return Outcome(x, multipliers, (below, above), kkt, int(reached["iterations"]), status in (0, 1), stopped, why)
@@ -188,3 +188,11 @@ def violation(programme: Programme, variables: Floats) -> float:
     rows = np.maximum(low - values, values - high).max(initial=0.0)
     x_low, x_high = programme.bounds
     return float(max(rows, np.maximum(x_low - variables, variables - x_high).max(initial=0.0), 0.0))
+
+
+def kkt_error(programme: Programme, variables: Floats, multipliers: Floats, bound_multipliers: Floats) -> float:
+    """Largest entry of the gradient of ``f + multipliers . rows + bound_multipliers . x``."""
+    residual = programme.gradient(variables) + bound_multipliers
+    row, column = programme.jacobian_pattern
+    np.add.at(residual, column, programme.jacobian(variables) * multipliers[row])
+    return float(np.abs(residual).max(initial=0.0))
