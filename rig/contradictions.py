@@ -59,7 +59,10 @@ def _check_base_height(limits: Limits) -> None:
                 f"no base/height exceeds {LARGEST_BASE_HEIGHT:g}",
                 "give a smaller ratio",
             )
-    pairs = (("min", ratio.min, "mean_max", ratio.mean_max), ("mean_min", ratio.mean_min, "max", ratio.max))
+    pairs = (
+        ("min", ratio.min, "mean_max", ratio.mean_max),
+        ("mean_min", ratio.mean_min, "max", ratio.max),
+    )
     for low_label, low, high_label, high in pairs:
         if low is not None and high is not None and low > high:
             raise _clash(
@@ -75,7 +78,11 @@ def _check_spacing(limits: Limits) -> None:
     if spacing is None:
         return
     longest = spacing.edge_mm + spacing.tolerance_mm
-    if ratio.min is not None and stand_off.min_mm is not None and ratio.min * stand_off.min_mm > longest:
+    if (
+        ratio.min is not None
+        and stand_off.min_mm is not None
+        and ratio.min * stand_off.min_mm > longest
+    ):
         raise _clash(
             f"limits.spacing allows edges of {longest:g} mm on average",
             f"limits.base_height.min and stand_off.min_mm ask for bases of "
@@ -83,7 +90,11 @@ def _check_spacing(limits: Limits) -> None:
             "give a longer edge_mm or a smaller B/H",
         )
     shortest = spacing.edge_mm - spacing.tolerance_mm
-    if ratio.max is not None and stand_off.max_mm is not None and ratio.max * stand_off.max_mm < shortest:
+    if (
+        ratio.max is not None
+        and stand_off.max_mm is not None
+        and ratio.max * stand_off.max_mm < shortest
+    ):
         raise _clash(
             f"limits.spacing asks for edges of {shortest:g} mm on average",
             f"limits.base_height.max and stand_off.max_mm allow bases of "

@@ -15,7 +15,9 @@ never overstated; it is understated by at most r (1/cos(pi/48) - 1), 0.03 mm at 
 
 def box_corners(size_mm: Floats, centre_mm: Floats) -> Floats:
     """The 8 corners of an upright box, (8, 3)."""
-    signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=np.float64)
+    signs = np.array(
+        [[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=np.float64
+    )
     return np.asarray(centre_mm + signs * np.asarray(size_mm) / 2.0)
 
 
@@ -24,7 +26,8 @@ def cylinder_corners(diameter_mm: float, near_z_mm: float, far_z_mm: float) -> F
     turn = 2.0 * np.pi * (np.arange(ROUND_SIDES) + 0.5) / ROUND_SIDES
     radius = diameter_mm / 2.0 / np.cos(np.pi / ROUND_SIDES)
     ring = np.stack([radius * np.cos(turn), radius * np.sin(turn), np.zeros(ROUND_SIDES)], axis=1)
-    return np.concatenate([ring + [0.0, 0.0, near_z_mm], ring + [0.0, 0.0, far_z_mm]])
+    along = np.array([0.0, 0.0, 1.0])
+    return np.concatenate([ring + near_z_mm * along, ring + far_z_mm * along])
 
 
 def signed_distance(one: Floats, other: Floats) -> float:

@@ -157,7 +157,9 @@ def read_design(path: Path, default_camera: Camera | None = None) -> ReadDesign:
     try:
         if path.stat().st_size > LARGEST_FILE_BYTES:
             raise TooLargeError(
-                "design-too-large", f"{path.name} is too large for a design file", "give a design.json"
+                "design-too-large",
+                f"{path.name} is too large for a design file",
+                "give a design.json",
             )
         data = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:

@@ -29,7 +29,9 @@ class LensFacts(StrictModel):
     f_number: float = Field(gt=0.0, description="Aperture.")
     circle_of_confusion_mm: float = Field(gt=0.0, description="Largest blur that counts as sharp.")
     min_focus_mm: float = Field(gt=0.0, description="Nearest focus setting.")
-    set_focus_mm: float | None = Field(None, gt=0.0, description="Focus setting that was given.")
+    set_focus_mm: float | None = Field(
+        default=None, gt=0.0, description="Focus setting that was given."
+    )
 
 
 class PlacedCamera(StrictModel):
@@ -38,9 +40,9 @@ class PlacedCamera(StrictModel):
     name: CameraName = Field(description="Name of the camera.")
     position_mm: Vector = Field(description="Projection centre in the rig frame.")
     rotation_rig_to_camera: Matrix | None = Field(
-        None, description="Rows are the camera's x, y and z axes in the rig frame."
+        default=None, description="Rows are the camera's x, y and z axes in the rig frame."
     )
-    omega_phi_kappa_deg: Vector | None = Field(None, description="The same as angles.")
+    omega_phi_kappa_deg: Vector | None = Field(default=None, description="The same as angles.")
     image_size_px: Annotated[list[Annotated[int, Field(ge=2, le=100_000)]], Len(2, 2)] = Field(
         description="Width and height of the image."
     )
@@ -48,10 +50,12 @@ class PlacedCamera(StrictModel):
     distortion: Annotated[list[float], Len(5, 5)] = Field(
         description="Brown-Conrady k1, k2, p1, p2, k3."
     )
-    focus_distance_mm: float | None = Field(None, gt=0.0, description="Focus setting.")
-    fixed: bool = Field(False, description="Whether the design had to leave it where it is.")
-    lens: LensFacts | None = Field(None, description="Lens and sensor.")
-    body: BodySection | None = Field(None, description="The solid it occupies.")
+    focus_distance_mm: float | None = Field(default=None, gt=0.0, description="Focus setting.")
+    fixed: bool = Field(
+        default=False, description="Whether the design had to leave it where it is."
+    )
+    lens: LensFacts | None = Field(default=None, description="Lens and sensor.")
+    body: BodySection | None = Field(default=None, description="The solid it occupies.")
 
 
 class ShareOfViews(StrictModel):
@@ -202,14 +206,14 @@ class DesignFile(StrictModel):
     """
 
     schema_: Literal["rigwright.design/1"] = Field(alias="schema", description="Version.")
-    rigwright: str | None = Field(None, description="Version of the program that wrote it.")
-    name: str | None = Field(None, description="Name of the rig.")
-    feasible: bool | None = Field(None, description="Whether every limit is satisfied.")
+    rigwright: str | None = Field(default=None, description="Version of the program that wrote it.")
+    name: str | None = Field(default=None, description="Name of the rig.")
+    feasible: bool | None = Field(default=None, description="Whether every limit is satisfied.")
     cameras: Annotated[list[PlacedCamera], Len(1, 1000)] = Field(description="The cameras.")
-    quality: QualityFigures | None = Field(None, description="Figures of the design.")
-    constraints: list[ConstraintFigures] | None = Field(None, description="All limits.")
-    solver: SolverFigures | None = Field(None, description="The solver's word.")
-    points: PointFigures | None = Field(None, description="Figures per point.")
-    start: StartState | None = Field(None, description="The start, before optimisation.")
-    scan: ScanFacts | None = Field(None, description="The scan.")
-    rig: RigFile | None = Field(None, description="The rig file as it was used.")
+    quality: QualityFigures | None = Field(default=None, description="Figures of the design.")
+    constraints: list[ConstraintFigures] | None = Field(default=None, description="All limits.")
+    solver: SolverFigures | None = Field(default=None, description="The solver's word.")
+    points: PointFigures | None = Field(default=None, description="Figures per point.")
+    start: StartState | None = Field(default=None, description="The start, before optimisation.")
+    scan: ScanFacts | None = Field(default=None, description="The scan.")
+    rig: RigFile | None = Field(default=None, description="The rig file as it was used.")

@@ -19,7 +19,9 @@ def example_text(name: str) -> str:
     """The rig file ``name`` as text; raises :class:`NotFoundError` when there is none."""
     if name not in example_names():
         known = ", ".join(example_names())
-        raise NotFoundError("example", f"there is no example rig {name!r}", f"choose one of {known}")
+        raise NotFoundError(
+            "example", f"there is no example rig {name!r}", f"choose one of {known}"
+        )
     return files("rig.data").joinpath(f"{name}.toml").read_text(encoding="utf-8")
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 import json
-import os
 import secrets
 import shutil
 from collections.abc import Callable, Mapping
@@ -15,7 +14,7 @@ from typing import Any
 from geometry.errors import ConflictError, InputError
 from geometry.preparation import PreparedSubject
 from rig.designfile import design_document
-from rig.layout import Layout, make_layout
+from rig.layout import Layout
 from rig.layoutfile import layout_csv, layout_document
 from rig.report import render_report
 from rig.scene import scene_glb
@@ -31,10 +30,19 @@ MEDIA_TYPES: Mapping[str, str] = {
     "scene.glb": "model/gltf-binary",
     "report.html": "text/html; charset=utf-8",
 }
-POINT_COLUMNS = ("x_mm", "y_mm", "z_mm", "sigma_mm", "start_sigma_mm", "views", "start_views", "in_focus_views")
+POINT_COLUMNS = (
+    "x_mm",
+    "y_mm",
+    "z_mm",
+    "sigma_mm",
+    "start_sigma_mm",
+    "views",
+    "start_views",
+    "in_focus_views",
+)
 
 
-def json_text(document: Any) -> str:
+def json_text(document: dict[str, Any]) -> str:
     """JSON as it is filed: readable at the top, one line per long list, never NaN."""
     return json.dumps(document, allow_nan=False, ensure_ascii=False, separators=(", ", ": ")) + "\n"
 
@@ -45,22 +53,32 @@ def points_csv(table: PointTable, start: PointTable) -> str:
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(POINT_COLUMNS)
     rows = zip(
-        table.points.points_mm, table.sigma_mm, start.sigma_mm, table.views, start.views, table.in_focus,
+        table.points.points_mm,
+        table.sigma_mm,
+        start.sigma_mm,
+        table.views,
+        start.views,
+        table.in_focus,
         strict=True,
-    )  # fmt: skip
+    )
     for place, sigma, before, views, views_before, sharp in rows:
-        writer.writerow([
-            *(f"{v:.3f}" for v in place), f"{sigma:.6g}", f"{before:.6g}",
-            int(views), int(views_before), int(sharp),
-        ])  # fmt: skip
+        writer.writerow(
+            [
+                *(f"{v:.3f}" for v in place),
+                f"{sigma:.6g}",
+                f"{before:.6g}",
+                int(views),
+                int(views_before),
+                int(sharp),
+            ]
+        )
     return text.getvalue()
 
 
 def design_files(
-    design: Design, prepared: PreparedSubject, spec: RigSpec, scan_name: str = ""
+    design: Design, layout: Layout, prepared: PreparedSubject, spec: RigSpec, scan_name: str = ""
 ) -> dict[str, Callable[[], bytes]]:
     """How to make each file of the folder, by name; nothing is made before it is called."""
-    layout = make_layout(design.cameras, prepared.subject, design.limits)
     points, start = design.quality.points, design.start_quality.points
     return {
         "design.json": lambda: json_text(
@@ -83,7 +101,12 @@ def _report(
 
 
 def write_design_folder(
-    out: Path, design: Design, prepared: PreparedSubject, spec: RigSpec, *, scan_name: str = ""
+    out: Path,
+    design: Design,
+    layout: Layout,
+    prepared: PreparedSubject,
+    spec: RigSpec,
+    scan_name: str = "",
 ) -> dict[str, Path]:
     """Write all files of a design to the folder ``out``; returns their paths by name.
 
@@ -92,7 +115,7 @@ def write_design_folder(
     a :class:`ConflictError`, because it would be lost.
     """
     check_design_folder(out)
-    makers = design_files(design, prepared, spec, scan_name)
+    makers = design_files(design, layout, prepared, spec, scan_name)
     half = out.parent / f".{out.name}.{secrets.token_hex(4)}.part"
     try:
         half.mkdir(parents=True)
@@ -130,7 +153,7 @@ def _put_in_place(half: Path, out: Path) -> None:
     if out.exists():
         out.rename(former)
     try:
-        os.replace(half, out)
+        half.rename(out)
     except OSError:
         if former.exists():
             former.rename(out)

@@ -64,8 +64,11 @@ class Placement:
 
 @dataclass(frozen=True)
 class Collision:
-    """Two cameras that come too close. ``kind``: ``body`` or ``view`` (``other`` stands in the
-    view of ``name``). ``required_mm`` is the gap that was asked for."""
+    """Two cameras that come too close.
+
+    ``kind``: ``body``, or ``view`` when ``other`` stands in the view of ``name``.
+    ``required_mm`` is the gap that was asked for.
+    """
 
     kind: str
     name: str
@@ -151,7 +154,9 @@ def _placement(
 ) -> Placement:
     solid, pose = camera.camera.body, camera.pose
     box = place_body(camera).parts[0]
-    points = np.array([[0.0, 0.0, solid.front_z_mm + solid.lens_length_mm], solid.mount_thread_camera_mm])
+    points = np.array(
+        [[0.0, 0.0, solid.front_z_mm + solid.lens_length_mm], solid.mount_thread_camera_mm]
+    )
     front, mount = pose.to_rig(points)
     across, towards, up = mount - datum
     return Placement(

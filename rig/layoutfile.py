@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+from collections.abc import Iterable
 from typing import Any
 
 from rig.layout import DATUM_NOTE, Collision, Layout, Neighbour, Placement
@@ -12,13 +13,27 @@ from rig.layout import DATUM_NOTE, Collision, Layout, Neighbour, Placement
 SCHEMA = "rigwright.layout/1"
 
 COLUMNS = (
-    "name", "fixed", "across_mm", "back_mm", "up_mm", "pan_deg", "tilt_deg", "roll_deg",
-    "tape_to_lens_mm", "focus_mm", "mount_x_mm", "mount_y_mm", "mount_z_mm",
-    "nearest_body", "body_clearance_mm", "nearest_to_view", "view_clearance_mm",
-)  # fmt: skip
+    "name",
+    "fixed",
+    "across_mm",
+    "back_mm",
+    "up_mm",
+    "pan_deg",
+    "tilt_deg",
+    "roll_deg",
+    "tape_to_lens_mm",
+    "focus_mm",
+    "mount_x_mm",
+    "mount_y_mm",
+    "mount_z_mm",
+    "nearest_body",
+    "body_clearance_mm",
+    "nearest_to_view",
+    "view_clearance_mm",
+)
 
 
-def rounded(values: Any, digits: int = 3) -> list[float]:
+def rounded(values: Iterable[float], digits: int = 3) -> list[float]:
     """A vector as JSON numbers of ``digits`` decimals: a micrometre, finer than any mount."""
     return [round(float(v), digits) + 0.0 for v in values]
 

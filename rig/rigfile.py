@@ -20,7 +20,7 @@ from rig.sections.subject import ScanSection, SubjectSection
 from rig.spec import RigSpec
 from rig.strict import StrictModel, validated
 
-SCHEMA = "rigwright.rig/1"
+SCHEMA: Literal["rigwright.rig/1"] = "rigwright.rig/1"
 LARGEST_FILE_BYTES = 1_000_000
 """A rig file is a page or two; a larger one is another file given by mistake."""
 
@@ -29,16 +29,20 @@ class RigFile(StrictModel):
     """The root of a rig file."""
 
     schema_: Literal["rigwright.rig/1"] = Field(
-        alias="schema", description="Version of the format: `\"rigwright.rig/1\"`."
+        alias="schema", description='Version of the format: `"rigwright.rig/1"`.'
     )
-    name: str = Field("rig", min_length=1, max_length=200, description="What to call the rig.")
+    name: str = Field(
+        default="rig", min_length=1, max_length=200, description="What to call the rig."
+    )
     cameras: int | None = Field(
-        None, ge=1, le=500,
+        default=None,
+        ge=1,
+        le=500,
         description="How many cameras to place, fixed ones not counted. Without it: as many as "
         "there are `[[start]]` poses, or 7.",
     )
-    seed: int = Field(0, ge=0, le=2**63 - 1, description="Seed of everything random.")
-    starts: int = Field(8, ge=1, le=1000, description="How many starts to try.")
+    seed: int = Field(default=0, ge=0, le=2**63 - 1, description="Seed of everything random.")
+    starts: int = Field(default=8, ge=1, le=1000, description="How many starts to try.")
     camera: CameraSection = Field(description="The kind of camera.")
     limits: LimitsSection = Field(
         default_factory=LimitsSection, description="What the rig must respect."
@@ -105,13 +109,17 @@ def read_rig(path: Path) -> RigSpec:
     try:
         if path.stat().st_size > LARGEST_FILE_BYTES:
             raise TooLargeError(
-                "rig-too-large", f"{path.name} is too large for a rig file", "give the rig's TOML file"
+                "rig-too-large",
+                f"{path.name} is too large for a rig file",
+                "give the rig's TOML file",
             )
         text = path.read_text(encoding="utf-8")
     except OSError as error:
         reason = error.strerror or "unreadable"
         raise InputError(
-            "rig-unreadable", f"cannot read the rig file {path} ({reason.lower()})", "check the path"
+            "rig-unreadable",
+            f"cannot read the rig file {path} ({reason.lower()})",
+            "check the path",
         ) from error
     except UnicodeDecodeError as error:
         raise InputError(

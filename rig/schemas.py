@@ -36,37 +36,46 @@ def _is_list_of(info: FieldInfo, model: type[BaseModel]) -> bool:
     return model in _flatten(info.annotation) and list in _origins(info.annotation)
 
 
-def _origins(annotation: Any) -> set[Any]:
+def _origins(annotation: object) -> set[Any]:
     found = {typing.get_origin(annotation)}
     for part in typing.get_args(annotation):
         found |= _origins(part)
     return found
 
 
-def _flatten(annotation: Any) -> set[Any]:
+def _flatten(annotation: object) -> set[Any]:
     parts = typing.get_args(annotation)
     return set().union(*(_flatten(p) for p in parts)) if parts else {annotation}
 
 
-def keys(model: type[BaseModel], prefix: str = "") -> Iterator[tuple[str, str, str]]:
-    """Every key of a file: dotted name (``[]`` marks lists of tables), default, description."""
+def keys(
+    model: type[BaseModel], prefix: str = "", told: dict[type[BaseModel], str] | None = None
+) -> Iterator[tuple[str, str, str]]:
+    """Every key of a file: dotted name (``[]`` marks lists of tables), default, description.
+
+    The keys of a table that occurs again are told only the first time.
+    """
+    told = {RigFile: "a rig file"} if told is None else told
     for name, info in model.model_fields.items():
-        key = prefix + key_of(name, model)
+        key, words = prefix + key_of(name, model), info.description or ""
         child = child_model(model, key_of(name, model))
         if child is None:
-            yield key, _default(info), info.description or ""
+            yield key, _default(info), words
             continue
-        listed = "[]" if _is_list_of(info, child) else ""
-        yield key + listed, _default(info) if not listed else "none", info.description or ""
-        if child is not RigFile and not (prefix and child.__name__ == "CameraSection"):
-            yield from keys(child, f"{key}{listed}.")
+        key += "[]" if _is_list_of(info, child) else ""
+        if child in told:
+            yield key, _default(info), f"{words} Keys as in {told[child]}."
+            continue
+        yield key, _default(info), words
+        told[child] = f"`{key}`"
+        yield from keys(child, f"{key}.", told)
 
 
 def _default(info: FieldInfo) -> str:
     if info.is_required():
         return "required"
     value = info.get_default(call_default_factory=True)
-    if value is None or isinstance(value, BaseModel):
+    if value is None or value == [] or isinstance(value, BaseModel):
         return ""
     return f"`{json.dumps(value)}`"
 

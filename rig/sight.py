@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-from geometry.arrays import Bools, Floats
+from geometry.arrays import Bools, Floats, Ints
 from geometry.camera import RigCamera
 from geometry.raycast import Occluder
 from geometry.surface import SurfacePoints
@@ -40,23 +40,24 @@ def seen_by(
 
 
 def outline(points: Floats) -> Floats:
-    """Corners (K, 2) of the convex hull of image points (N, 2), in order; all when they lie in line."""
+    """Corners (K, 2) of the convex hull of image points (N, 2), in order."""
+    return np.asarray(points[_edge(points)])
+
+
+def _edge(points: Floats) -> Ints:
+    """Indices of the corners of the convex hull; all of them when there is no area to outline."""
     try:
-        return np.asarray(points[ConvexHull(points).vertices])
+        return np.asarray(ConvexHull(points).vertices, dtype=np.int64)
     except (QhullError, ValueError):
-        # Fewer than three points, or points in line, have no area to outline.
-        return points
+        # Fewer than three points, or points in line.
+        return np.arange(len(points))
 
 
 def view_corners(rig_camera: RigCamera, seen_points_mm: Floats) -> Floats:
     """Corners (K, 3) of the view: the projection centre and the outermost seen points (N, 3)."""
     local = rig_camera.pose.to_camera(seen_points_mm)
     flat = local[:, :2] / local[:, 2:]
-    try:
-        edge = ConvexHull(flat).vertices
-    except (QhullError, ValueError):
-        edge = np.arange(len(flat))
-    return np.vstack([rig_camera.pose.position_rig_mm, seen_points_mm[edge]])
+    return np.vstack([rig_camera.pose.position_rig_mm, seen_points_mm[_edge(flat)]])
 
 
 def view_clearance_mm(corners: Floats, body: PlacedBody) -> float:

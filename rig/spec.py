@@ -38,7 +38,7 @@ class RigSpec:
         if self.count < 1 or total < 2:
             raise InputError(
                 "rig-too-few-cameras",
-                f"the rig has {total} camera{'s' if total != 1 else ''}, {self.count} of them to place",
+                f"the rig has {total} camera{'' if total == 1 else 's'}, {self.count} to place",
                 "place at least one and have two in all: one camera cannot measure",
             )
         if self.start and len(self.start) != self.count:

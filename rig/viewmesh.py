@@ -13,7 +13,9 @@ def simplified(vertices_mm: Floats, faces: Ints, most_faces: int) -> tuple[Float
     Vertices that share a cell of a grid become their mean; the grid is coarsened until the
     faces are few enough. Good for looking, not for measuring.
     """
-    cell = _mean_edge_mm(vertices_mm, faces) * np.sqrt(len(faces) / most_faces) if len(faces) else 1.0
+    cell = (
+        _mean_edge_mm(vertices_mm, faces) * np.sqrt(len(faces) / most_faces) if len(faces) else 1.0
+    )
     light, kept = vertices_mm, faces
     while len(kept) > most_faces:
         light, kept = _merged(vertices_mm, faces, cell)
@@ -34,5 +36,9 @@ def _merged(vertices_mm: Floats, faces: Ints, cell_mm: float) -> tuple[Floats, I
     counts = np.bincount(owner)
     sums = [np.bincount(owner, weights=vertices_mm[:, axis]) for axis in range(3)]
     mapped = owner[faces]
-    whole = (mapped[:, 0] != mapped[:, 1]) & (mapped[:, 1] != mapped[:, 2]) & (mapped[:, 2] != mapped[:, 0])
+    whole = (
+        (mapped[:, 0] != mapped[:, 1])
+        & (mapped[:, 1] != mapped[:, 2])
+        & (mapped[:, 2] != mapped[:, 0])
+    )
     return np.stack(sums, axis=1) / counts[:, None], np.unique(mapped[whole], axis=0)

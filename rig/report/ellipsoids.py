@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,6 +12,9 @@ from rig.report.colours import GOOD_TO_BAD, SKIN
 from rig.report.surface import ViewMesh
 from rig.report.three import mesh_trace, scene_layout
 from solver.result import PointTable
+
+if TYPE_CHECKING:
+    import plotly.graph_objects as go
 
 SHOWN = 140
 """Ellipsoids per figure: enough for the pattern, few enough to tell apart."""
@@ -73,8 +76,8 @@ def ellipsoids(table: PointTable, sample: Ints, factor: float, largest_mm: float
 
 def ellipsoid_figure(
     mesh: ViewMesh, table: PointTable, shown: Ellipsoids, limits: tuple[float, float]
-) -> Any:
-    """Ellipsoids on the subject; crosses where fewer than two cameras see the point."""
+) -> go.Figure:
+    """Ellipsoids on the subject; dots where fewer than two cameras see the point."""
     import plotly.graph_objects as go
 
     figure = go.Figure()
@@ -85,11 +88,17 @@ def ellipsoid_figure(
         figure.add_trace(_solid(table, shown, limits))
     if len(shown.lost):
         at = table.points.points_mm[shown.lost] + 2.0 * table.points.normals[shown.lost]
-        figure.add_trace(go.Scatter3d(
-            x=at[:, 0], y=at[:, 1], z=at[:, 2], mode="markers", name="fewer than two views",
-            marker={"size": 3.5, "color": "#c81e1e"},
-            hovertemplate="fewer than two views<extra></extra>",
-        ))  # fmt: skip
+        figure.add_trace(
+            go.Scatter3d(
+                x=at[:, 0],
+                y=at[:, 1],
+                z=at[:, 2],
+                mode="markers",
+                name="fewer than two views",
+                marker={"size": 3.5, "color": "#c81e1e"},
+                hovertemplate="fewer than two views<extra></extra>",
+            )
+        )
     figure.update_layout(**scene_layout(1.12, axes=False), showlegend=False)
     return figure
 
@@ -105,7 +114,7 @@ def _near_region(mesh: ViewMesh, table: PointTable) -> Ints:
     return np.asarray(mesh.faces[inside[mesh.faces].all(axis=1)])
 
 
-def _solid(table: PointTable, shown: Ellipsoids, limits: tuple[float, float]) -> Any:
+def _solid(table: PointTable, shown: Ellipsoids, limits: tuple[float, float]) -> go.Mesh3d:
     import plotly.graph_objects as go
     from trimesh.creation import icosphere
 
@@ -121,9 +130,19 @@ def _solid(table: PointTable, shown: Ellipsoids, limits: tuple[float, float]) ->
     x, y, z = vertices.T.astype(np.float32)
     i, j, k = faces.T.astype(np.uint16 if len(vertices) < 65_536 else np.uint32)
     return go.Mesh3d(
-        x=x, y=y, z=z, i=i, j=j, k=k,
+        x=x,
+        y=y,
+        z=z,
+        i=i,
+        j=j,
+        k=k,
         intensity=np.repeat(sigma, len(corners)).astype(np.float32),
-        colorscale=GOOD_TO_BAD, cmin=limits[0], cmax=limits[1], showscale=False,
-        text=np.repeat(words, len(corners)).tolist(), hovertemplate="%{text}<extra></extra>",
-        lighting={"ambient": 0.6, "diffuse": 0.6, "specular": 0.1}, name="ellipsoids",
-    )  # fmt: skip
+        colorscale=GOOD_TO_BAD,
+        cmin=limits[0],
+        cmax=limits[1],
+        showscale=False,
+        text=np.repeat(words, len(corners)).tolist(),
+        hovertemplate="%{text}<extra></extra>",
+        lighting={"ambient": 0.6, "diffuse": 0.6, "specular": 0.1},
+        name="ellipsoids",
+    )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,14 +12,20 @@ from rig.report.colours import GOOD_TO_BAD, VIEW_STEPS
 from rig.report.surface import FrontView, RegionLookup, front_view
 from solver.result import PointTable
 
+if TYPE_CHECKING:
+    import plotly.graph_objects as go
+
 PIXELS = np.float32
 NOTHING = 255
 """Value of a shade's pixel where there is no subject. Shades are bytes: a quarter of the size."""
 
 SHADE_SCALE = [
-    [0.0, "rgba(0,0,0,0)"], [0.3, "rgba(0,0,0,0.05)"], [254 / 255, "rgba(0,0,0,0.62)"],
-    [254 / 255, "rgba(0,0,0,0)"], [1.0, "rgba(0,0,0,0)"],
-]  # fmt: skip
+    [0.0, "rgba(0,0,0,0)"],
+    [0.3, "rgba(0,0,0,0.05)"],
+    [254 / 255, "rgba(0,0,0,0.62)"],
+    [254 / 255, "rgba(0,0,0,0)"],
+    [1.0, "rgba(0,0,0,0)"],
+]
 GREY_SCALE = [[0.0, "#b9bcc4"], [0.5, "#b9bcc4"], [0.5, "rgba(0,0,0,0)"], [1.0, "rgba(0,0,0,0)"]]
 
 
@@ -35,7 +41,7 @@ def sigma_range_mm(table: PointTable) -> tuple[float, float]:
     return float(low), float(max(high, low * 1.05 + 1e-12))
 
 
-def error_maps(subject: Subject, before: PointTable, after: PointTable) -> dict[str, Any]:
+def error_maps(subject: Subject, before: PointTable, after: PointTable) -> dict[str, go.Figure]:
     """Figures by the key of their place: sigma before and after, views after."""
     limits = sigma_range_mm(after)
     if len(subject.occluder.faces) == 0:
@@ -46,8 +52,10 @@ def error_maps(subject: Subject, before: PointTable, after: PointTable) -> dict[
         }
     lookup = RegionLookup(after)
     view = front_view(subject.occluder, after, lookup)
-    earlier = view if before.points is after.points else front_view(
-        subject.occluder, before, RegionLookup(before)
+    earlier = (
+        view
+        if before.points is after.points
+        else front_view(subject.occluder, before, RegionLookup(before))
     )
     return {
         "map-before": _map(earlier, before.sigma_mm, limits),
@@ -65,11 +73,15 @@ def _scale(limits: tuple[float, float] | None) -> dict[str, Any]:
     count = len(VIEW_STEPS)
     steps = [[(k + e) / count, colour] for k, colour in enumerate(VIEW_STEPS) for e in (0, 1)]
     labels = [str(k) for k in range(count - 1)] + [f"{count - 1}+"]
-    bar |= {"title": {"text": "views", "side": "top"}, "tickvals": list(range(count)), "ticktext": labels}
+    bar |= {
+        "title": {"text": "views", "side": "top"},
+        "tickvals": list(range(count)),
+        "ticktext": labels,
+    }
     return {"colorscale": steps, "cmin": -0.5, "cmax": count - 0.5, "colorbar": bar}
 
 
-def _map(view: FrontView, values: Floats, limits: tuple[float, float] | None) -> Any:
+def _map(view: FrontView, values: Floats, limits: tuple[float, float] | None) -> go.Figure:
     import plotly.graph_objects as go
 
     on_region = view.nearest >= 0
@@ -80,29 +92,48 @@ def _map(view: FrontView, values: Floats, limits: tuple[float, float] | None) ->
     skin = np.where(view.on_subject, 0, NOTHING).astype(np.uint8)
     shade = np.where(view.on_subject, np.round(view.shade * 254.0), NOTHING).astype(np.uint8)
     under = {"zmin": 0, "zmax": NOTHING, "showscale": False, "hoverinfo": "skip"}
-    figure = go.Figure([
-        go.Heatmap(z=skin, **place, **under, colorscale=GREY_SCALE),
-        go.Heatmap(z=shown.astype(PIXELS), **place, colorscale=scale["colorscale"], zmin=scale["cmin"],
-                   zmax=scale["cmax"], colorbar=scale["colorbar"], hovertemplate=f"{word}<extra></extra>"),
-        go.Heatmap(z=shade, **place, **under, colorscale=SHADE_SCALE),
-    ])  # fmt: skip
+    figure = go.Figure(
+        [
+            go.Heatmap(z=skin, **place, **under, colorscale=GREY_SCALE),
+            go.Heatmap(
+                z=shown.astype(PIXELS),
+                **place,
+                colorscale=scale["colorscale"],
+                zmin=scale["cmin"],
+                zmax=scale["cmax"],
+                colorbar=scale["colorbar"],
+                hovertemplate=f"{word}<extra></extra>",
+            ),
+            go.Heatmap(z=shade, **place, **under, colorscale=SHADE_SCALE),
+        ]
+    )
     return _flat(figure)
 
 
-def _dots(table: PointTable, values: Floats, limits: tuple[float, float] | None) -> Any:
+def _dots(table: PointTable, values: Floats, limits: tuple[float, float] | None) -> go.Figure:
     import plotly.graph_objects as go
 
     points, scale = table.points.points_mm, _scale(limits)
     word = "σ %{marker.color:.3f} mm" if limits is not None else "%{marker.color:.0f} views"
-    marker = {"size": 9, "color": values, **scale, "line": {"width": 1, "color": "rgba(128,128,128,.6)"}}
-    figure = go.Figure(go.Scatter(
-        x=points[:, 0], y=points[:, 2], mode="markers", marker=marker,
-        hovertemplate=f"{word}<extra></extra>",
-    ))  # fmt: skip
+    marker = {
+        "size": 9,
+        "color": values,
+        **scale,
+        "line": {"width": 1, "color": "rgba(128,128,128,.6)"},
+    }
+    figure = go.Figure(
+        go.Scatter(
+            x=points[:, 0],
+            y=points[:, 2],
+            mode="markers",
+            marker=marker,
+            hovertemplate=f"{word}<extra></extra>",
+        )
+    )
     return _flat(figure)
 
 
-def _flat(figure: Any) -> Any:
+def _flat(figure: go.Figure) -> go.Figure:
     axis = {"showgrid": False, "zeroline": False, "ticks": "", "showticklabels": False}
     figure.update_layout(
         xaxis={**axis, "constrain": "domain"},

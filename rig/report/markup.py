@@ -43,7 +43,11 @@ def element(tag: str, content: str, **attributes: str) -> str:
 
 
 def table(
-    head: Sequence[str], rows: Iterable[Sequence[str]], *, css: str = "", row_css: Sequence[str] = ()
+    head: Sequence[str],
+    rows: Iterable[Sequence[str]],
+    *,
+    css: str = "",
+    row_css: Sequence[str] = (),
 ) -> str:
     """A table in a box that scrolls by itself; all cells are HTML already."""
     top = "".join(f'<th scope="col">{cell}</th>' for cell in head)

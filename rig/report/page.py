@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from importlib.resources import files
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from geometry.scan import ScanNote
 from geometry.subject import Subject
@@ -27,6 +27,9 @@ from rig.report.rigview import rig_figure
 from rig.report.surface import RegionLookup, view_mesh
 from solver.result import Design
 
+if TYPE_CHECKING:
+    import plotly.graph_objects as go
+
 POLICY = (
     "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval'; style-src 'unsafe-inline'; "
     "img-src data: blob:; font-src data:"
@@ -40,7 +43,7 @@ SMALL_HEAD_FACES = 9_000
 class _Figures:
     """Plotly figures by the key of their place, and what the texts say about them."""
 
-    plots: dict[str, Any]
+    plots: dict[str, go.Figure]
     before: Ellipsoids
     after: Ellipsoids
     factor: float
@@ -62,19 +65,21 @@ def render_report(
     gets ``view``, a JSON summary of what is drawn, and ``ready`` once the figures stand.
     """
     figures = _figures(design, subject, layout)
-    body = "".join((
-        sections.verdict(design, layout),
-        sections.tiles(design, layout),
-        sections.rig(),
-        sections.accuracy(design),
-        sections.ellipsoids(design, figures.before, figures.after, figures.factor),
-        sections.footprints(design, subject),
-        sections.limits(design),
-        sections.cameras(design),
-        sections.mounts(design, layout, subject),
-        sections.solver(design),
-        sections.scan(notes, scan_name),
-    ))  # fmt: skip
+    body = "".join(
+        (
+            sections.verdict(design, layout),
+            sections.tiles(design, layout),
+            sections.rig(),
+            sections.accuracy(design),
+            sections.ellipsoids(design, figures.before, figures.after, figures.factor),
+            sections.footprints(design, subject),
+            sections.limits(design),
+            sections.cameras(design),
+            sections.mounts(design, layout, subject),
+            sections.solver(design),
+            sections.scan(notes, scan_name),
+        )
+    )
     summary = {
         "cameras": len(design.cameras),
         "ellipsoids": len(figures.after.rows),
@@ -109,7 +114,12 @@ def _figures(design: Design, subject: Subject, layout: Layout) -> _Figures:
 
 
 def _document(
-    title: str, scan_name: str, design: Design, body: str, plots: dict[str, Any], summary: dict[str, Any]
+    title: str,
+    scan_name: str,
+    design: Design,
+    body: str,
+    plots: dict[str, Any],
+    summary: dict[str, Any],
 ) -> str:
     # Imported here: plotly costs a second, and only a report needs it.
     from plotly.offline import get_plotlyjs
@@ -117,7 +127,11 @@ def _document(
     here = files("rig.report")
     style = here.joinpath("style.css").read_text(encoding="utf-8")
     script = here.joinpath("page.js").read_text(encoding="utf-8")
-    data = "{" + ",".join(f"{json.dumps(key)}:{_figure_json(plot)}" for key, plot in plots.items()) + "}"
+    data = (
+        "{"
+        + ",".join(f"{json.dumps(key)}:{_figure_json(plot)}" for key, plot in plots.items())
+        + "}"
+    )
     view = esc(json.dumps(summary, allow_nan=False))
     return f"""<!doctype html>
 <html lang="en">
@@ -142,8 +156,10 @@ def _document(
 """
 
 
-def _figure_json(plot: Any) -> str:
+def _figure_json(plot: go.Figure) -> str:
     """A figure as JSON that may stand inside a script element, whatever names it holds."""
     # The default template would double the page's figures with styles the page overrides.
     plot.update_layout(template="none")
-    return str(plot.to_json()).replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+    return (
+        str(plot.to_json()).replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+    )

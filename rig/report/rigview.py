@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,11 +17,16 @@ from rig.report.three import SOFT, lines_trace, mesh_trace, scene_layout
 from rig.scene import frustum_corners_mm
 from solver.result import Design, PointTable
 
+if TYPE_CHECKING:
+    import plotly.graph_objects as go
+
 VIEW_SHARE = 0.42
 """Views are drawn to this share of the way to the subject, so that they do not hide it."""
 
 
-def rig_figure(design: Design, mesh: ViewMesh, layout: Layout, limits: tuple[float, float]) -> Any:
+def rig_figure(
+    design: Design, mesh: ViewMesh, layout: Layout, limits: tuple[float, float]
+) -> go.Figure:
     """The main figure."""
     import plotly.graph_objects as go
 
@@ -31,20 +36,35 @@ def rig_figure(design: Design, mesh: ViewMesh, layout: Layout, limits: tuple[flo
     centre = design.quality.points.points.centroid_mm
     figure.add_trace(lines_trace(_view_edges(design.cameras, centre), AFTER, "views"))
     axes = _axes(design.cameras, centre)
-    figure.add_trace(lines_trace(axes, AFTER, "optical axes", line={"width": 2, "dash": "dot"}, visible="legendonly"))
+    figure.add_trace(
+        lines_trace(axes, AFTER, "optical axes", width=2.0, dotted=True, visible="legendonly")
+    )
     start = _view_edges(design.start_cameras, centre)
     figure.add_trace(lines_trace(start, BEFORE, "start, before optimisation", visible="legendonly"))
     figure.add_trace(_names(design.cameras))
     datum = layout.datum_rig_mm
-    figure.add_trace(go.Scatter3d(
-        x=datum[:1], y=datum[1:2], z=datum[2:], mode="markers", name="datum",
-        marker={"size": 5, "symbol": "diamond", "color": "#c81e1e"},
-        hovertemplate="datum<extra></extra>",
-    ))  # fmt: skip
+    figure.add_trace(
+        go.Scatter3d(
+            x=datum[:1],
+            y=datum[1:2],
+            z=datum[2:],
+            mode="markers",
+            name="datum",
+            marker={"size": 5, "symbol": "diamond", "color": "#c81e1e"},
+            hovertemplate="datum<extra></extra>",
+        )
+    )
     figure.update_layout(**scene_layout(1.02))
-    figure.update_layout(legend={
-        "orientation": "h", "x": 0.0, "y": 0.0, "yanchor": "top", "bgcolor": "rgba(0,0,0,0)",
-    }, margin={"l": 0, "r": 0, "t": 0, "b": 60})  # fmt: skip
+    figure.update_layout(
+        legend={
+            "orientation": "h",
+            "x": 0.0,
+            "y": 0.0,
+            "yanchor": "top",
+            "bgcolor": "rgba(0,0,0,0)",
+        },
+        margin={"l": 0, "r": 0, "t": 0, "b": 60},
+    )
     return figure
 
 
@@ -52,31 +72,62 @@ def _subject_traces(mesh: ViewMesh, table: PointTable, limits: tuple[float, floa
     import plotly.graph_objects as go
 
     bar = {
-        "title": {"text": "σ mm", "side": "top"}, "orientation": "h", "thickness": 10, "len": 0.42,
-        "x": 0.0, "xanchor": "left", "y": 1.0, "yanchor": "top", "outlinewidth": 0, "nticks": 5,
-    }  # fmt: skip
+        "title": {"text": "σ mm", "side": "top"},
+        "orientation": "h",
+        "thickness": 10,
+        "len": 0.42,
+        "x": 0.0,
+        "xanchor": "left",
+        "y": 1.0,
+        "yanchor": "top",
+        "outlinewidth": 0,
+        "nticks": 5,
+    }
     colours = {"colorscale": GOOD_TO_BAD, "cmin": limits[0], "cmax": limits[1], "colorbar": bar}
     if len(mesh.faces) == 0:
         x, y, z = table.points.points_mm.T
         marker = {"size": 5, "color": table.sigma_mm, **colours}
-        return [go.Scatter3d(
-            x=x, y=y, z=z, mode="markers", marker=marker, text=_words(table), name="points",
-            hovertemplate="%{text}<extra></extra>", showlegend=False,
-        )]  # fmt: skip
+        return [
+            go.Scatter3d(
+                x=x,
+                y=y,
+                z=z,
+                mode="markers",
+                marker=marker,
+                text=_words(table),
+                name="points",
+                hovertemplate="%{text}<extra></extra>",
+                showlegend=False,
+            )
+        ]
     rest, region = mesh.faces[~mesh.in_region], mesh.faces[mesh.in_region]
     used, region = _only_used(region)
     nearest = mesh.nearest[used]
     words = _words(table)
-    traces = [mesh_trace(mesh.vertices_mm, rest, SKIN, "head", hoverinfo="skip")] if len(rest) else []
+    traces = (
+        [mesh_trace(mesh.vertices_mm, rest, SKIN, "head", hoverinfo="skip")] if len(rest) else []
+    )
     if len(region):
         x, y, z = mesh.vertices_mm[used].T.astype(np.float32)
         i, j, k = region.T.astype(np.uint16 if len(used) < 65_536 else np.uint32)
-        traces.append(go.Mesh3d(
-            x=x, y=y, z=z, i=i, j=j, k=k, intensity=table.sigma_mm[nearest].astype(np.float32),
-            text=[words[n] for n in nearest], hovertemplate="%{text}<extra></extra>",
-            lighting=SOFT, lightposition={"x": -4000, "y": -12000, "z": 9000},
-            name="region", showscale=True, **colours,
-        ))  # fmt: skip
+        traces.append(
+            go.Mesh3d(
+                x=x,
+                y=y,
+                z=z,
+                i=i,
+                j=j,
+                k=k,
+                intensity=table.sigma_mm[nearest].astype(np.float32),
+                text=[words[n] for n in nearest],
+                hovertemplate="%{text}<extra></extra>",
+                lighting=SOFT,
+                lightposition={"x": -4000, "y": -12000, "z": 9000},
+                name="region",
+                showscale=True,
+                **colours,
+            )
+        )
     return traces
 
 
@@ -89,7 +140,7 @@ def _only_used(faces: Ints) -> tuple[Ints, Ints]:
     return used.astype(np.int64), renumbered.reshape(faces.shape).astype(np.int64)
 
 
-def _body_trace(design: Design, layout: Layout, index: int, camera: RigCamera) -> Any:
+def _body_trace(design: Design, layout: Layout, index: int, camera: RigCamera) -> go.Mesh3d:
     from scipy.spatial import ConvexHull
 
     vertices, faces, first = [], [], 0
@@ -104,13 +155,18 @@ def _body_trace(design: Design, layout: Layout, index: int, camera: RigCamera) -
         f"<b>{esc(camera.name)}</b>{' (fixed)' if camera.fixed else ''}",
         f"pan {figure_text(pan)}°, tilt {figure_text(tilt)}°, roll {figure_text(roll)}°",
         f"{figure_text(float(figures.distance_mm[index]))} mm from the subject's centroid",
-        f"focus {figure_text(camera.focus_distance_mm)} mm, {int(figures.points_seen[index])} points seen",
+        f"focus {figure_text(camera.focus_distance_mm)} mm",
+        f"{int(figures.points_seen[index])} points seen",
     ]
     return mesh_trace(
-        np.concatenate(vertices), np.concatenate(faces), FIXED if camera.fixed else BODY, esc(camera.name),
-        flatshading=True, hovertemplate="<br>".join(lines) + "<extra></extra>",
+        np.concatenate(vertices),
+        np.concatenate(faces),
+        FIXED if camera.fixed else BODY,
+        esc(camera.name),
+        flatshading=True,
+        hovertemplate="<br>".join(lines) + "<extra></extra>",
         lighting={"ambient": 0.75, "diffuse": 0.5, "specular": 0.15},
-    )  # fmt: skip
+    )
 
 
 def _view_edges(cameras: tuple[RigCamera, ...], centre: Floats) -> Floats:
@@ -132,12 +188,25 @@ def _axes(cameras: tuple[RigCamera, ...], centre: Floats) -> Floats:
     return np.array(ends)
 
 
-def _names(cameras: tuple[RigCamera, ...]) -> Any:
+def _names(cameras: tuple[RigCamera, ...]) -> go.Scatter3d:
     import plotly.graph_objects as go
 
     # Behind the body, where the name hides nothing.
-    at = np.array([c.pose.to_rig(np.array([[0.0, 0.0, c.camera.body.front_z_mm - 1.6 * c.camera.body.size_mm[2]]]))[0] for c in cameras])
+    at = np.array(
+        [
+            c.pose.to_rig(
+                np.array([[0.0, 0.0, c.camera.body.front_z_mm - 1.6 * c.camera.body.size_mm[2]]])
+            )[0]
+            for c in cameras
+        ]
+    )
     return go.Scatter3d(
-        x=at[:, 0], y=at[:, 1], z=at[:, 2], mode="text", text=[esc(c.name) for c in cameras],
-        name="names", hoverinfo="skip", textfont={"size": 20},
-    )  # fmt: skip
+        x=at[:, 0],
+        y=at[:, 1],
+        z=at[:, 2],
+        mode="text",
+        text=[esc(c.name) for c in cameras],
+        name="names",
+        hoverinfo="skip",
+        textfont={"size": 20},
+    )

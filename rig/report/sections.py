@@ -15,10 +15,16 @@ from rig.report.words import family_words
 from solver.result import Design, Status
 
 CONTENTS = (
-    ("rig", "Rig"), ("accuracy", "Accuracy"), ("ellipsoids", "Ellipsoids"), ("images", "Images"),
-    ("limits", "Limits"), ("cameras", "Cameras"), ("mounts", "Mounts"), ("solver", "Solver"),
+    ("rig", "Rig"),
+    ("accuracy", "Accuracy"),
+    ("ellipsoids", "Ellipsoids"),
+    ("images", "Images"),
+    ("limits", "Limits"),
+    ("cameras", "Cameras"),
+    ("mounts", "Mounts"),
+    ("solver", "Solver"),
     ("scan", "Scan"),
-)  # fmt: skip
+)
 
 
 def heading(title: str, scan_name: str, design: Design) -> str:
@@ -50,7 +56,9 @@ def verdict(design: Design, layout: Layout) -> str:
     if layout.collisions:
         more += f" The layout check lists {len(layout.collisions)} collisions: see Mounts."
     css = "verdict broken" if broken or layout.collisions else "verdict"
-    return f'<div class="{css}"><p class="word">{esc(word)}</p><p class="more">{esc(more)}</p></div>'
+    return (
+        f'<div class="{css}"><p class="word">{esc(word)}</p><p class="more">{esc(more)}</p></div>'
+    )
 
 
 def _tile(name: str, figure: str, note: str) -> str:
@@ -69,16 +77,40 @@ def tiles(design: Design, layout: Layout) -> str:
     two, three = tables.lowest_coverage(quality, 2), tables.lowest_coverage(quality, 3)
     gsd = quality.cameras.gsd_mm[:, 1]
     mean_gsd = float(gsd[gsd == gsd].mean()) if (gsd == gsd).any() else math.nan
-    return '<div class="tiles">' + "".join((
-        _tile("Median error σ", f"{figure_text(sigma)} <small>mm</small>",
-              f"{figure_text(before)} mm at the start"),
-        _tile("95 % of points below", f"{figure_text(quality.sigma_p95_mm)} <small>mm</small>",
-              f"largest {figure_text(quality.sigma_max_mm)} mm"),
-        _tile("Seen by two or more", percent(two), f"by three or more: {percent(three)}"),
-        _tile("Sharp", percent(quality.in_focus_share), f"in frame: {percent(quality.in_frame_share)}"),
-        _tile("Pixel on the subject", f"{figure_text(mean_gsd)} <small>mm</small>", "mean over the cameras"),
-        _tile("Room the array takes", f"{width} × {depth} × {height}", "mm: width, depth, height"),
-    )) + "</div>"  # fmt: skip
+    return (
+        '<div class="tiles">'
+        + "".join(
+            (
+                _tile(
+                    "Median error σ",
+                    f"{figure_text(sigma)} <small>mm</small>",
+                    f"{figure_text(before)} mm at the start",
+                ),
+                _tile(
+                    "95 % of points below",
+                    f"{figure_text(quality.sigma_p95_mm)} <small>mm</small>",
+                    f"largest {figure_text(quality.sigma_max_mm)} mm",
+                ),
+                _tile("Seen by two or more", percent(two), f"by three or more: {percent(three)}"),
+                _tile(
+                    "Sharp",
+                    percent(quality.in_focus_share),
+                    f"in frame: {percent(quality.in_frame_share)}",
+                ),
+                _tile(
+                    "Pixel on the subject",
+                    f"{figure_text(mean_gsd)} <small>mm</small>",
+                    "mean over the cameras",
+                ),
+                _tile(
+                    "Room the array takes",
+                    f"{width} × {depth} × {height}",
+                    "mm: width, depth, height",
+                ),
+            )
+        )
+        + "</div>"
+    )
 
 
 def rig() -> str:
@@ -100,14 +132,22 @@ def accuracy(design: Design) -> str:
         "is outside the region the rig was designed for. The third map counts the views: a point "
         "needs two to be measured, and the third guards against mistakes."
     )
-    maps = "".join((
-        plot("map-before", "σ at the start"),
-        plot("map-after", "σ of the design"),
-        plot("map-views", "Views of the design"),
-    ))  # fmt: skip
-    numbers = element("div", _titled("Accuracy", tables.accuracy_table(design))
-                      + _titled("Coverage", tables.coverage_table(design)), class_="grid2")  # fmt: skip
-    return section("accuracy", "Accuracy on the subject", words, f'<div class="grid3">{maps}</div>', numbers)
+    maps = "".join(
+        (
+            plot("map-before", "σ at the start"),
+            plot("map-after", "σ of the design"),
+            plot("map-views", "Views of the design"),
+        )
+    )
+    numbers = element(
+        "div",
+        _titled("Accuracy", tables.accuracy_table(design))
+        + _titled("Coverage", tables.coverage_table(design)),
+        class_="grid2",
+    )
+    return section(
+        "accuracy", "Accuracy on the subject", words, f'<div class="grid3">{maps}</div>', numbers
+    )
 
 
 def _titled(title: str, content: str) -> str:
@@ -133,13 +173,21 @@ def ellipsoids(design: Design, before: Ellipsoids, after: Ellipsoids, factor: fl
             f'<span class="key lost">●</span> marks points that fewer than two cameras see: '
             f"{len(before.lost)} at the start, {len(after.lost)} in the design."
         )
-    pair = "".join((
-        plot("ellipsoids-before", _median("Start", design.start_quality.sigma_median_mm), "tall"),
-        plot("ellipsoids-after", _median("Design", design.quality.sigma_median_mm), "tall"),
-    ))  # fmt: skip
+    pair = "".join(
+        (
+            plot(
+                "ellipsoids-before", _median("Start", design.start_quality.sigma_median_mm), "tall"
+            ),
+            plot("ellipsoids-after", _median("Design", design.quality.sigma_median_mm), "tall"),
+        )
+    )
     extra = f'<p class="lead">{" ".join(notes)}</p>' if notes else ""
     return section(
-        "ellipsoids", "Error ellipsoids before and after", words, extra, f'<div class="grid2">{pair}</div>'
+        "ellipsoids",
+        "Error ellipsoids before and after",
+        words,
+        extra,
+        f'<div class="grid2">{pair}</div>',
     )
 
 
@@ -150,8 +198,8 @@ def _median(name: str, sigma_mm: float) -> str:
 def footprints(design: Design, subject: Subject) -> str:
     """What every camera has in its image."""
     words = (
-        'The frame of each image with the points that camera sees. <span class="key"></span> is the '
-        'outline in the design, <span class="key before"></span> at the start; an outline that '
+        'The frame of each image with the points that camera sees. <span class="key"></span> is '
+        'the outline in the design, <span class="key before"></span> at the start; an outline that '
         "leaves the frame is cut off. The cross is the principal point."
     )
     limit = design.limits.incidence.ray_max_deg
@@ -165,9 +213,9 @@ def footprints(design: Design, subject: Subject) -> str:
 def limits(design: Design) -> str:
     """The limits and what binds."""
     words = (
-        "Every limit at its worst place. A limit <b>binds</b> when it has no slack left: the design "
-        "would be better without it. These are the ones to think about when more accuracy is "
-        "wanted. A <b>broken</b> limit has negative slack."
+        "Every limit at its worst place. A limit <b>binds</b> when it has no slack left: the "
+        "design would be better without it. These are the ones to think about when more accuracy "
+        "is wanted. A <b>broken</b> limit has negative slack."
     )
     return section("limits", "Limits", words, tables.constraint_table(design.quality.constraints))
 
@@ -181,30 +229,45 @@ def cameras(design: Design) -> str:
         "directions say how strongly two cameras intersect: more is more precise, less is easier "
         "to match."
     )
-    pairs = element("div", _titled("Base/height of pairs", tables.pair_table(design, design.quality.base_height, "B/H"))
-                    + _titled("Convergence of pairs, degrees", tables.pair_table(design, design.quality.convergence_deg, "°")),
-                    class_="grid2")  # fmt: skip
+    pairs = element(
+        "div",
+        _titled(
+            "Base/height of pairs", tables.pair_table(design, design.quality.base_height, "B/H")
+        )
+        + _titled(
+            "Convergence of pairs, degrees",
+            tables.pair_table(design, design.quality.convergence_deg, "°"),
+        ),
+        class_="grid2",
+    )
     return section("cameras", "What each camera sees", words, tables.camera_table(design), pairs)
 
 
 def mounts(design: Design, layout: Layout, subject: Subject) -> str:
     """The mount layout: what a builder sets."""
     words = (
-        "All lengths start at the <b>datum</b>, the foremost point of the subject (the nose tip of a "
-        "face): across is positive to the subject's left, back is away from the subject, up is "
-        "upwards. They lead to the mouth of the 1/4-20 thread under the body. Pan, tilt and roll "
-        "are set in that order on a head, from a level camera that looks straight at the subject's "
-        "side of the room: pan right, tilt up and roll clockwise are positive, seen from behind "
-        "the camera. The tape length from the datum to the middle of the lens front is a check."
+        "All lengths start at the <b>datum</b>, the foremost point of the subject (the nose tip "
+        "of a face): across is positive to the subject's left, back is away from the subject, up "
+        "is upwards. They lead to the mouth of the 1/4-20 thread under the body. Pan, tilt and "
+        "roll are set in that order on a head, from a level camera that looks along +Y: pan to the "
+        "right, tilt up and roll clockwise are positive, seen from behind the camera. The tape length from the datum to the middle of the lens front is a check."
     )
-    drawings = "".join((
-        array_drawing(design.cameras, layout, subject, (0, 2), "From behind the cameras"),
-        array_drawing(design.cameras, layout, subject, (0, 1), "From above, subject at the top"),
-    ))  # fmt: skip
+    drawings = "".join(
+        (
+            array_drawing(design.cameras, layout, subject, (0, 2), "From behind the cameras"),
+            array_drawing(
+                design.cameras, layout, subject, (0, 1), "From above, subject at the top"
+            ),
+        )
+    )
     return section(
-        "mounts", "Mount layout", words, f'<div class="grid2">{drawings}</div>',
-        tables.layout_table(layout), _collisions(layout),
-    )  # fmt: skip
+        "mounts",
+        "Mount layout",
+        words,
+        f'<div class="grid2">{drawings}</div>',
+        tables.layout_table(layout),
+        _collisions(layout),
+    )
 
 
 def _collisions(layout: Layout) -> str:
@@ -219,15 +282,21 @@ def _collisions(layout: Layout) -> str:
 
 
 def _collision(kind: str, name: str, other: str) -> str:
-    return f"{name} and {other} are too close" if kind == "body" else f"{other} stands in the view of {name}"
+    return (
+        f"{name} and {other} are too close"
+        if kind == "body"
+        else f"{other} stands in the view of {name}"
+    )
 
 
 def solver(design: Design) -> str:
     """The solver's word."""
     report = design.solver
     status = {
-        Status.CONVERGED: "converged", Status.STOPPED: "stopped early", Status.INFEASIBLE: "found no design within the limits",
-    }[report.status]  # fmt: skip
+        Status.CONVERGED: "converged",
+        Status.STOPPED: "stopped early",
+        Status.INFEASIBLE: "found no design within the limits",
+    }[report.status]
     words = (
         f"The solver ({esc(report.engine)}) {status}: {esc(report.why_stopped)}. "
         f"{report.iterations} iterations in {report.rounds} rounds, KKT error "
@@ -237,20 +306,28 @@ def solver(design: Design) -> str:
     )
     content = tables.starts_table(report) if report.starts else ""
     if report.conflicts:
-        content = _titled("Limits that contradict each other", tables.conflict_table(report)) + content
+        content = (
+            _titled("Limits that contradict each other", tables.conflict_table(report)) + content
+        )
     return section("solver", "The solver's word", words, content)
 
 
 def scan(notes: tuple[ScanNote, ...], scan_name: str) -> str:
     """What was inferred from the scan and changed in it."""
     named = f" ({esc(scan_name)})" if scan_name else ""
-    words = f"What was not given with the scan{named} was inferred, and what was wrong was repaired."
+    words = (
+        f"What was not given with the scan{named} was inferred, and what was wrong was repaired."
+    )
     items = "".join(
-        f'<li class="{esc(note.kind)}"><span class="kind">{esc(note.kind)}</span>{esc(note.text)}</li>'
+        f'<li class="{esc(note.kind)}"><span class="kind">{esc(note.kind)}</span>'
+        f"{esc(note.text)}</li>"
         for note in notes
     )
     return section(
-        "scan", "The scan", words, f'<ul class="notes">{items}</ul>' if items else "<p>Nothing to say.</p>"
+        "scan",
+        "The scan",
+        words,
+        f'<ul class="notes">{items}</ul>' if items else "<p>Nothing to say.</p>",
     )
 
 

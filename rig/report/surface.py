@@ -33,7 +33,7 @@ class RegionLookup:
         points = table.points.points_mm
         self._tree = cKDTree(points)
         if len(points) > 1:
-            distance, _ = self._tree.query(points, k=2)
+            distance = np.asarray(self._tree.query(points, k=2)[0])
             # A high percentile: points drawn at random leave gaps that are not holes.
             self.spacing_mm = float(np.percentile(distance[:, 1], 90.0))
         else:
@@ -50,8 +50,11 @@ class RegionLookup:
 
 @dataclass(frozen=True, eq=False)
 class ViewMesh:
-    """A light mesh: ``vertices_mm`` (V, 3), ``faces`` (F, 3); ``in_region`` (F,) marks faces whose
-    corners all have a point of the region, ``nearest`` (V,) which one."""
+    """A light mesh, ``vertices_mm`` (V, 3) and ``faces`` (F, 3).
+
+    ``in_region`` (F,) marks the faces whose corners all have a point of the region near them,
+    ``nearest`` (V,) says which one.
+    """
 
     vertices_mm: Floats
     faces: Ints
@@ -84,7 +87,9 @@ class FrontView:
     shade: Floats
 
 
-def front_view(occluder: Occluder, table: PointTable, lookup: RegionLookup, columns: int = 170) -> FrontView:
+def front_view(
+    occluder: Occluder, table: PointTable, lookup: RegionLookup, columns: int = 170
+) -> FrontView:
     """Look along +Y at the region and a margin about it."""
     points = table.points.points_mm
     low, high = points.min(axis=0), points.max(axis=0)

@@ -20,9 +20,13 @@ def constraint_table(rows: tuple[ConstraintRow, ...]) -> str:
     binding = [r for r in rows if r.satisfied and r.active]
     others = [r for r in rows if r.satisfied and not r.active]
     first = broken + binding
-    html = _constraints(first[:SHOWN_ROWS]) if first else "<p>No limit is broken and none binds.</p>"
+    html = (
+        _constraints(first[:SHOWN_ROWS]) if first else "<p>No limit is broken and none binds.</p>"
+    )
     if first[SHOWN_ROWS:]:
-        html += _folded(f"{len(first) - SHOWN_ROWS} more that bind", _constraints(first[SHOWN_ROWS:]))
+        html += _folded(
+            f"{len(first) - SHOWN_ROWS} more that bind", _constraints(first[SHOWN_ROWS:])
+        )
     if others:
         html += _folded(f"{len(others)} limits that hold with room to spare", _constraints(others))
     return html
@@ -41,16 +45,20 @@ def _constraints(rows: list[ConstraintRow]) -> str:
         elif row.active:
             state = "binds"
         title, words = family_words(row.family)
-        subject = "" if row.subject == row.family else f' <span class="who">{esc(row.subject)}</span>'
+        subject = (
+            "" if row.subject == row.family else f' <span class="who">{esc(row.subject)}</span>'
+        )
         unit = f" {esc(row.unit)}" if row.unit else ""
         sense = {"<=": "≤", ">=": "≥", "==": "="}[str(row.sense)]
-        cells.append((
-            element("span", esc(title), title=words) + subject,
-            figure_text(row.value, 4) + unit,
-            f"{sense} {figure_text(row.limit, 4)}{unit}",
-            figure_text(row.slack, 3) + unit,
-            f'<span class="badge {state}">{state}</span>',
-        ))  # fmt: skip
+        cells.append(
+            (
+                element("span", esc(title), title=words) + subject,
+                figure_text(row.value, 4) + unit,
+                f"{sense} {figure_text(row.limit, 4)}{unit}",
+                figure_text(row.slack, 3) + unit,
+                f'<span class="badge {state}">{state}</span>',
+            )
+        )
         css.append(state)
     return table(("Limit", "Value", "Asked for", "Slack", "State"), cells, row_css=css)
 
@@ -60,21 +68,38 @@ def camera_table(design: Design) -> str:
     figures, rows = design.quality.cameras, []
     for i, camera in enumerate(design.cameras):
         gsd, incidence, depth, focus = (
-            figures.gsd_mm[i], figures.incidence_deg[i], figures.depth_mm[i], figures.focus_mm[i],
-        )  # fmt: skip
-        rows.append((
-            esc(camera.name) + (" <small>fixed</small>" if camera.fixed else ""),
-            str(int(figures.points_seen[i])),
-            figure_text(figures.distance_mm[i], 4),
-            figure_text(camera.focus_distance_mm, 4),
-            f"{figure_text(depth[0], 4)} – {figure_text(depth[1], 4)}",
-            f"{figure_text(focus[0], 4)} – {figure_text(focus[1], 4)}",
-            f"{figure_text(gsd[1])} <small>({figure_text(gsd[0])} – {figure_text(gsd[2])})</small>",
-            f"{figure_text(incidence[0])}° <small>(max {figure_text(incidence[1])}°)</small>",
-        ))  # fmt: skip
-    head = ("Camera", "Points seen", "Distance mm", "Focus mm", "Points lie at mm", "Sharp from – to mm",
-            "GSD mm", "Incidence")  # fmt: skip
+            figures.gsd_mm[i],
+            figures.incidence_deg[i],
+            figures.depth_mm[i],
+            figures.focus_mm[i],
+        )
+        rows.append(
+            (
+                esc(camera.name) + (" <small>fixed</small>" if camera.fixed else ""),
+                str(int(figures.points_seen[i])),
+                figure_text(figures.distance_mm[i], 4),
+                figure_text(camera.focus_distance_mm, 4),
+                _span(depth, 4),
+                _span(focus, 4),
+                f"{figure_text(gsd[1])} <small>({_span(gsd[[0, 2]])})</small>",
+                f"{figure_text(incidence[0])}° <small>(max {figure_text(incidence[1])}°)</small>",
+            )
+        )
+    head = (
+        "Camera",
+        "Points seen",
+        "Distance mm",
+        "Focus mm",
+        "Points lie at mm",
+        "Sharp from – to mm",
+        "GSD mm",
+        "Incidence",
+    )
     return table(head, rows)
+
+
+def _span(ends: Floats, digits: int = 3) -> str:
+    return f"{figure_text(ends[0], digits)} – {figure_text(ends[1], digits)}"
 
 
 def coverage_table(design: Design) -> str:
@@ -85,8 +110,16 @@ def coverage_table(design: Design) -> str:
         for c in design.quality.coverage
     ]
     rows += [
-        ("of the views: sharp", percent(design.start_quality.in_focus_share), percent(design.quality.in_focus_share)),
-        ("of the views: in frame", percent(design.start_quality.in_frame_share), percent(design.quality.in_frame_share)),
+        (
+            "of the views: sharp",
+            percent(design.start_quality.in_focus_share),
+            percent(design.quality.in_focus_share),
+        ),
+        (
+            "of the views: in frame",
+            percent(design.start_quality.in_frame_share),
+            percent(design.quality.in_frame_share),
+        ),
     ]
     return table(("Views of a point", "Start", "Design"), rows, css="narrow")
 
@@ -122,7 +155,9 @@ def pair_table(design: Design, values: Floats, unit: str) -> str:
                 cells.append('<span class="none"></span>')
                 continue
             share = max(0.0, min(1.0, values[i, j] / top)) if np.isfinite(values[i, j]) else 0.0
-            cells.append(f'<span class="heat" style="--heat:{share:.2f}">{figure_text(values[i, j])}</span>')
+            cells.append(
+                f'<span class="heat" style="--heat:{share:.2f}">{figure_text(values[i, j])}</span>'
+            )
         rows.append(cells)
     return table((esc(unit), *(esc(name) for name in names)), rows, css="pairs")
 
@@ -131,16 +166,32 @@ def starts_table(solver: SolverReport) -> str:
     """How the starts went; the best feasible one won."""
     rows, css = [], []
     for start in solver.starts:
-        rows.append((
-            str(start.index + 1), esc(start.kind), "yes" if start.feasible else "no",
-            figure_text(start.cost_mm2, 4), figure_text(start.violation, 2), str(start.iterations),
-            str(start.rounds), esc(start.why_stopped),
-        ))  # fmt: skip
+        rows.append(
+            (
+                str(start.index + 1),
+                esc(start.kind),
+                "yes" if start.feasible else "no",
+                figure_text(start.cost_mm2, 4),
+                figure_text(start.violation, 2),
+                str(start.iterations),
+                str(start.rounds),
+                esc(start.why_stopped),
+            )
+        )
         css.append("")
     feasible = [i for i, s in enumerate(solver.starts) if s.feasible]
     if feasible:
         css[min(feasible, key=lambda i: solver.starts[i].cost_mm2)] = "best"
-    head = ("Start", "Kind", "All limits hold", "Mean |Q| mm²", "Breach", "Iterations", "Rounds", "Why it stopped")
+    head = (
+        "Start",
+        "Kind",
+        "All limits hold",
+        "Mean |Q| mm²",
+        "Breach",
+        "Iterations",
+        "Rounds",
+        "Why it stopped",
+    )
     return table(head, rows, row_css=css)
 
 
@@ -150,9 +201,19 @@ def conflict_table(solver: SolverReport) -> str:
     for conflict in solver.conflicts:
         title, words = family_words(conflict.family)
         unit = f" {esc(conflict.unit)}" if conflict.unit else ""
-        alone = "is not enough" if conflict.give_alone is None else figure_text(conflict.give_alone) + unit
-        rows.append((element("span", esc(title), title=words), figure_text(conflict.give) + unit, alone))
-    return table(("Limit", "Gives way in the nearest design by", "It alone would have to by"), rows, css="narrow")
+        alone = (
+            "is not enough"
+            if conflict.give_alone is None
+            else figure_text(conflict.give_alone) + unit
+        )
+        rows.append(
+            (element("span", esc(title), title=words), figure_text(conflict.give) + unit, alone)
+        )
+    return table(
+        ("Limit", "Gives way in the nearest design by", "It alone would have to by"),
+        rows,
+        css="narrow",
+    )
 
 
 def layout_table(layout: Layout) -> str:
@@ -161,16 +222,28 @@ def layout_table(layout: Layout) -> str:
     for placement in layout.placements:
         across, back, up = placement.from_datum_mm
         pan, tilt, roll = placement.pan_tilt_roll_deg
-        rows.append((
-            esc(placement.camera.name),
-            *(_tenths(v) for v in (across, back, up)),
-            *(f"{_tenths(v)}°" for v in (pan, tilt, roll)),
-            f"{placement.tape_mm:.1f}",
-            _neighbour(placement.nearest_body),
-            _neighbour(placement.nearest_to_view),
-        ))  # fmt: skip
-    head = ("Camera", "Across mm", "Back mm", "Up mm", "Pan", "Tilt", "Roll", "Tape to lens mm",
-            "Nearest body", "Nearest to its view")  # fmt: skip
+        rows.append(
+            (
+                esc(placement.camera.name),
+                *(_tenths(v) for v in (across, back, up)),
+                *(f"{_tenths(v)}°" for v in (pan, tilt, roll)),
+                f"{placement.tape_mm:.1f}",
+                _neighbour(placement.nearest_body),
+                _neighbour(placement.nearest_to_view),
+            )
+        )
+    head = (
+        "Camera",
+        "Across mm",
+        "Back mm",
+        "Up mm",
+        "Pan",
+        "Tilt",
+        "Roll",
+        "Tape to lens mm",
+        "Nearest body",
+        "Nearest to its view",
+    )
     return table(head, rows)
 
 

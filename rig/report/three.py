@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from geometry.arrays import Floats, Ints
 
+if TYPE_CHECKING:
+    import plotly.graph_objects as go
+
 SOFT = {"ambient": 0.55, "diffuse": 0.75, "specular": 0.05, "roughness": 0.9, "fresnel": 0.05}
 
 
-def mesh_trace(vertices_mm: Floats, faces: Ints, colour: str, name: str, **more: Any) -> Any:
+def mesh_trace(
+    vertices_mm: Floats, faces: Ints, colour: str, name: str, **more: object
+) -> go.Mesh3d:
     """A mesh (V, 3), (F, 3) in one colour; numbers in single precision, the page gets smaller."""
     import plotly.graph_objects as go
 
@@ -22,22 +27,36 @@ def mesh_trace(vertices_mm: Floats, faces: Ints, colour: str, name: str, **more:
     return go.Mesh3d(x=x, y=y, z=z, i=i, j=j, k=k, **options)
 
 
-def lines_trace(segments: Floats, colour: str, name: str, **more: Any) -> Any:
+def lines_trace(
+    segments: Floats,
+    colour: str,
+    name: str,
+    *,
+    width: float = 3.0,
+    dotted: bool = False,
+    **more: object,
+) -> go.Scatter3d:
     """Line segments (S, 2, 3) as one trace."""
     import plotly.graph_objects as go
 
     gaps = np.full((len(segments), 1, 3), np.nan)
     x, y, z = np.concatenate([segments, gaps], axis=1).reshape(-1, 3).T.astype(np.float32)
-    line = {"color": colour, "width": 3} | more.pop("line", {})
+    line = {"color": colour, "width": width} | ({"dash": "dot"} if dotted else {})
     return go.Scatter3d(x=x, y=y, z=z, mode="lines", line=line, name=name, hoverinfo="skip", **more)
 
 
-def scene_layout(zoom: float, *, axes: bool = True, eye: tuple[float, float, float] = (-0.9, -1.45, 0.45)) -> dict[str, Any]:
+def scene_layout(
+    zoom: float, *, axes: bool = True, eye: tuple[float, float, float] = (-0.9, -1.45, 0.45)
+) -> dict[str, Any]:
     """A scene in true proportion, seen from the cameras' side."""
     axis = {
-        "showbackground": False, "gridcolor": "#c9ced8", "zeroline": False, "showspikes": False,
-        "nticks": 6, "visible": axes,
-    }  # fmt: skip
+        "showbackground": False,
+        "gridcolor": "#c9ced8",
+        "zeroline": False,
+        "showspikes": False,
+        "nticks": 6,
+        "visible": axes,
+    }
     look = np.array(eye) / zoom
     return {
         "scene": {

@@ -4,8 +4,14 @@ from __future__ import annotations
 
 FAMILIES: dict[str, tuple[str, str]] = {
     "bounds": ("Bounds", "How far a camera may move or turn from its start (Eq 8)."),
-    "base_height": ("Base/height", "Distance of two cameras over their distance to the subject (Eq 9)."),
-    "incidence": ("Incidence", "Angle between the surface's normal and the way to the camera (Eq 10)."),
+    "base_height": (
+        "Base/height",
+        "Distance of two cameras over their distance to the subject (Eq 9).",
+    ),
+    "incidence": (
+        "Incidence",
+        "Angle between the surface's normal and the way to the camera (Eq 10).",
+    ),
     "frame": ("In frame", "Every seen point lies inside the image (Eq 11)."),
     "centring": ("Centred image", "The seen points are centred in the image (Eq 12)."),
     "spacing": ("Spacing", "Mean distance of neighbouring cameras (Eq 13)."),
@@ -21,14 +27,21 @@ FAMILIES: dict[str, tuple[str, str]] = {
     "zone_forbidden": ("Forbidden zone", "Gap to a zone where no camera may stand."),
 }
 
+ENDS = {
+    "min": "least",
+    "max": "greatest",
+    "mean min": "least mean",
+    "mean max": "greatest mean",
+}
+
 
 def family_words(family: str) -> tuple[str, str]:
-    """Title and explanation of a family such as ``base_height_min``; the family itself if unknown."""
+    """Title and explanation of a family such as ``base_height_min``; or the family itself."""
     known = [key for key in FAMILIES if family == key or family.startswith(key + "_")]
     if not known:
         return family.replace("_", " "), ""
     key = max(known, key=len)
     title, words = FAMILIES[key]
     rest = family[len(key) :].strip("_").replace("_", " ")
-    rest = {"min": "least", "max": "greatest", "mean min": "least mean", "mean max": "greatest mean"}.get(rest, rest)
+    rest = ENDS.get(rest, rest)
     return f"{title}, {rest}" if rest else title, words

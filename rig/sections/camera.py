@@ -24,16 +24,16 @@ class BodySection(StrictModel):
 
     size_mm: Vector = Field(description="Width, height and depth of the body.")
     centre_mm: Vector | None = Field(
-        None,
+        default=None,
         description="Centre of the body seen from the projection centre. Without it the body "
         "stands behind the lens and the projection centre lies half-way along the lens.",
     )
-    lens_diameter_mm: float = Field(0.0, ge=0.0, description="Outer diameter of the lens.")
+    lens_diameter_mm: float = Field(default=0.0, ge=0.0, description="Outer diameter of the lens.")
     lens_length_mm: float = Field(
-        0.0, ge=0.0, description="How far the lens reaches out of the body's front."
+        default=0.0, ge=0.0, description="How far the lens reaches out of the body's front."
     )
     mount_thread_mm: Vector | None = Field(
-        None,
+        default=None,
         description="Centre of the 1/4-20 thread's mouth. Without it: the middle of the "
         "body's underside.",
     )
@@ -43,7 +43,9 @@ class BodySection(StrictModel):
         size = np.array(self.size_mm)
         centre = self.centre_mm or [0.0, 0.0, -(self.lens_length_mm + self.size_mm[2]) / 2.0]
         thread = np.full(3, np.nan) if self.mount_thread_mm is None else self.mount_thread_mm
-        return Body(size, np.array(centre), self.lens_diameter_mm, self.lens_length_mm, np.array(thread))
+        return Body(
+            size, np.array(centre), self.lens_diameter_mm, self.lens_length_mm, np.array(thread)
+        )
 
     @classmethod
     def from_body(cls, body: Body) -> Self:
@@ -60,7 +62,7 @@ class BodySection(StrictModel):
 class CameraSection(StrictModel):
     """One kind of camera with its lens, used at every place of the rig."""
 
-    name: CameraName = Field("camera", description="What to call this kind of camera.")
+    name: CameraName = Field(default="camera", description="What to call this kind of camera.")
     image_size_px: Annotated[list[Annotated[int, Field(ge=2, le=100_000)]], Len(2, 2)] = Field(
         description="Width and height of the image."
     )
@@ -74,14 +76,16 @@ class CameraSection(StrictModel):
         gt=0.0, description="Nearest focus setting, from the projection centre."
     )
     focus_mm: float | None = Field(
-        None, gt=0.0, description="Focus setting. Without it the design chooses one per camera."
+        default=None,
+        gt=0.0,
+        description="Focus setting. Without it the design chooses one per camera.",
     )
     distortion: Annotated[list[float], Len(5, 5)] = Field(
         default_factory=lambda: [0.0] * 5,
         description="Brown-Conrady terms k1, k2, p1, p2, k3 (OpenCV's order).",
     )
     principal_point_px: Pair | None = Field(
-        None,
+        default=None,
         description="Principal point, pixel centres at integers. Without it: the image centre.",
     )
     body: BodySection = Field(description="The solid the camera occupies.")

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import asdict
-from typing import Annotated, Any, Self, TypeVar
+from typing import Annotated, Self, TypeVar
 
 from pydantic import Field, model_validator
 
@@ -30,6 +30,17 @@ from solver.limits import (
 )
 
 NonNegative = Annotated[float, Field(ge=0.0)]
+Plain = (
+    PoseBounds
+    | BaseHeight
+    | Incidence
+    | Frame
+    | Centring
+    | Spacing
+    | Symmetry
+    | StandOff
+    | MotionBox
+)
 LimitT = TypeVar("LimitT")
 OtherT = TypeVar("OtherT")
 SwitchedT = TypeVar("SwitchedT", bound="Switched")
@@ -39,7 +50,7 @@ class Switched(StrictModel):
     """A limit with a switch."""
 
     enabled: bool = Field(
-        True, description="`false` switches the limit off and keeps its numbers."
+        default=True, description="`false` switches the limit off and keeps its numbers."
     )
 
 
@@ -52,7 +63,7 @@ def _limit(
     return limit(**section.model_dump(exclude={"enabled"})) if section.enabled else off
 
 
-def _section(model: type[SwitchedT], limit: Any) -> SwitchedT | None:
+def _section(model: type[SwitchedT], limit: Plain | None) -> SwitchedT | None:
     """The inverse of :func:`_limit`."""
     return None if limit is None else model.model_validate(asdict(limit))
 
@@ -60,23 +71,31 @@ def _section(model: type[SwitchedT], limit: Any) -> SwitchedT | None:
 class BoundsSection(Switched):
     """Eq 8: how far each camera may move from its start, to either side."""
 
-    omega_deg: NonNegative | None = Field(None, description="Half range of omega; absent: free.")
-    phi_deg: NonNegative | None = Field(None, description="Half range of phi; absent: free.")
-    kappa_deg: NonNegative | None = Field(None, description="Half range of kappa; absent: free.")
-    x_mm: NonNegative | None = Field(None, description="Half range of X; absent: free.")
-    y_mm: NonNegative | None = Field(None, description="Half range of Y; absent: free.")
-    z_mm: NonNegative | None = Field(None, description="Half range of Z; absent: free.")
+    omega_deg: NonNegative | None = Field(
+        default=None, description="Half range of omega; absent: free."
+    )
+    phi_deg: NonNegative | None = Field(
+        default=None, description="Half range of phi; absent: free."
+    )
+    kappa_deg: NonNegative | None = Field(
+        default=None, description="Half range of kappa; absent: free."
+    )
+    x_mm: NonNegative | None = Field(default=None, description="Half range of X; absent: free.")
+    y_mm: NonNegative | None = Field(default=None, description="Half range of Y; absent: free.")
+    z_mm: NonNegative | None = Field(default=None, description="Half range of Z; absent: free.")
 
 
 class BaseHeightSection(Switched):
     """Eq 9: base/height ratio of camera pairs."""
 
-    min: NonNegative | None = Field(None, description="Least B/H of every pair.")
-    max: NonNegative | None = Field(None, description="Greatest B/H of every pair.")
-    mean_min: NonNegative | None = Field(None, description="Least mean B/H over all pairs.")
-    mean_max: NonNegative | None = Field(None, description="Greatest mean B/H over all pairs.")
+    min: NonNegative | None = Field(default=None, description="Least B/H of every pair.")
+    max: NonNegative | None = Field(default=None, description="Greatest B/H of every pair.")
+    mean_min: NonNegative | None = Field(default=None, description="Least mean B/H over all pairs.")
+    mean_max: NonNegative | None = Field(
+        default=None, description="Greatest mean B/H over all pairs."
+    )
     neighbour_max: NonNegative | None = Field(
-        None, description="Greatest B/H of each camera and its nearest neighbour."
+        default=None, description="Greatest B/H of each camera and its nearest neighbour."
     )
 
 
@@ -84,12 +103,14 @@ class IncidenceSection(Switched):
     """Eq 10: angle of incidence. The switch turns off the mean; ``ray_max_deg`` stays."""
 
     ray_max_deg: float = Field(
-        75.0, ge=0.0, le=89.0,
+        default=75.0,
+        ge=0.0,
+        le=89.0,
         description="A point counts as seen up to this angle between its normal and the ray. "
         "It says what a view is, so it holds even when the limit is switched off.",
     )
     mean_max_deg: NonNegative | None = Field(
-        None, description="Greatest mean angle of a camera's axis to the points' normals."
+        default=None, description="Greatest mean angle of a camera's axis to the points' normals."
     )
 
     def to_limit(self) -> Incidence:
@@ -100,31 +121,33 @@ class IncidenceSection(Switched):
 class FrameSection(Switched):
     """Eq 11: every seen point lies inside the image. On when the table is absent."""
 
-    margin_px: NonNegative = Field(0.0, description="Distance to keep from the image border.")
+    margin_px: NonNegative = Field(
+        default=0.0, description="Distance to keep from the image border."
+    )
 
 
 class CentringSection(Switched):
     """Eq 12: the mean image coordinates of the seen points are zero."""
 
-    tolerance_px: NonNegative = Field(0.0, description="How far the mean may be off.")
+    tolerance_px: NonNegative = Field(default=0.0, description="How far the mean may be off.")
 
 
 class SpacingSection(Switched):
     """Eq 13: the mean Delaunay edge between cameras has a design length."""
 
     edge_mm: NonNegative = Field(description="The design length.")
-    tolerance_mm: NonNegative = Field(0.0, description="How far the mean may be off.")
+    tolerance_mm: NonNegative = Field(default=0.0, description="How far the mean may be off.")
 
 
 class SymmetrySection(Switched):
     """Eqs 14 and 15: symmetry of the camera positions about the object's centroid."""
 
-    axes: str = Field("x", description="Axes it holds for, for example `\"x\"` or `\"xz\"`.")
+    axes: str = Field(default="x", description='Axes it holds for, for example `"x"` or `"xz"`.')
     median_tolerance_mm: NonNegative | None = Field(
-        None, description="Eq 14: mean and median agree within this; absent: off."
+        default=None, description="Eq 14: mean and median agree within this; absent: off."
     )
     balance_tolerance_mm: NonNegative | None = Field(
-        None, description="Eq 15: the mean is zero within this; absent: off."
+        default=None, description="Eq 15: the mean is zero within this; absent: off."
     )
 
     @model_validator(mode="after")
@@ -145,7 +168,8 @@ class CoverageSection(Switched):
     """How often points must be seen. The switch turns off the tiers."""
 
     unseen_sigma_mm: float = Field(
-        10.0, gt=0.0,
+        default=10.0,
+        gt=0.0,
         description="Standard deviation of a point before anybody looks: what losing it costs.",
     )
     tier: list[TierSection] = Field(default_factory=list, description="The steps.")
@@ -175,20 +199,20 @@ class GsdSection(Switched):
 class StandOffSection(Switched):
     """Distance of each projection centre from the object's centroid."""
 
-    min_mm: NonNegative | None = Field(None, description="Least distance.")
-    max_mm: NonNegative | None = Field(None, description="Greatest distance.")
+    min_mm: NonNegative | None = Field(default=None, description="Least distance.")
+    max_mm: NonNegative | None = Field(default=None, description="Greatest distance.")
 
 
 class BodiesSection(Switched):
     """Camera bodies do not touch. On when the table is absent."""
 
-    clearance_mm: NonNegative = Field(0.0, description="Gap to keep between bodies.")
+    clearance_mm: NonNegative = Field(default=0.0, description="Gap to keep between bodies.")
 
 
 class SightLinesSection(Switched):
     """No body stands in another camera's view. On when the table is absent."""
 
-    clearance_mm: NonNegative = Field(0.0, description="Gap to keep between body and view.")
+    clearance_mm: NonNegative = Field(default=0.0, description="Gap to keep between body and view.")
 
 
 def _clearance(
@@ -202,35 +226,35 @@ def _clearance(
 class MotionSection(Switched):
     """Head movement for which the design must hold, to either side."""
 
-    x_mm: NonNegative = Field(0.0, description="Sideways.")
-    y_mm: NonNegative = Field(0.0, description="Towards and away from the cameras.")
-    z_mm: NonNegative = Field(0.0, description="Up and down.")
-    pitch_deg: NonNegative = Field(0.0, le=45.0, description="Turn about X (nodding).")
-    roll_deg: NonNegative = Field(0.0, le=45.0, description="Turn about Y (tilting).")
-    yaw_deg: NonNegative = Field(0.0, le=45.0, description="Turn about Z (shaking).")
+    x_mm: NonNegative = Field(default=0.0, description="Sideways.")
+    y_mm: NonNegative = Field(default=0.0, description="Towards and away from the cameras.")
+    z_mm: NonNegative = Field(default=0.0, description="Up and down.")
+    pitch_deg: NonNegative = Field(default=0.0, le=45.0, description="Turn about X (nodding).")
+    roll_deg: NonNegative = Field(default=0.0, le=45.0, description="Turn about Y (tilting).")
+    yaw_deg: NonNegative = Field(default=0.0, le=45.0, description="Turn about Z (shaking).")
 
 
 class LimitsSection(StrictModel):
     """Everything the rig must respect."""
 
     image_sigma_px: float = Field(
-        0.5, gt=0.0, description="Standard deviation of an image measurement."
+        default=0.5, gt=0.0, description="Standard deviation of an image measurement."
     )
-    bounds: BoundsSection | None = Field(None, description="Eq 8, bounds about the start.")
-    base_height: BaseHeightSection | None = Field(None, description="Eq 9, base/height.")
-    incidence: IncidenceSection | None = Field(None, description="Eq 10, incidence.")
-    frame: FrameSection | None = Field(None, description="Eq 11, in frame.")
-    centring: CentringSection | None = Field(None, description="Eq 12, centred images.")
-    spacing: SpacingSection | None = Field(None, description="Eq 13, camera spacing.")
-    symmetry: SymmetrySection | None = Field(None, description="Eqs 14 and 15, symmetry.")
-    coverage: CoverageSection | None = Field(None, description="Views per point.")
-    depth_of_field: DepthOfFieldSection | None = Field(None, description="Sharpness.")
-    gsd: GsdSection | None = Field(None, description="Pixel size on the object.")
-    stand_off: StandOffSection | None = Field(None, description="Distance to the object.")
-    bodies: BodiesSection | None = Field(None, description="Gap between bodies.")
-    sight_lines: SightLinesSection | None = Field(None, description="Free views.")
-    zones: ZonesSection | None = Field(None, description="Where cameras may stand.")
-    motion: MotionSection | None = Field(None, description="Head movement.")
+    bounds: BoundsSection | None = Field(default=None, description="Eq 8, bounds about the start.")
+    base_height: BaseHeightSection | None = Field(default=None, description="Eq 9, base/height.")
+    incidence: IncidenceSection | None = Field(default=None, description="Eq 10, incidence.")
+    frame: FrameSection | None = Field(default=None, description="Eq 11, in frame.")
+    centring: CentringSection | None = Field(default=None, description="Eq 12, centred images.")
+    spacing: SpacingSection | None = Field(default=None, description="Eq 13, camera spacing.")
+    symmetry: SymmetrySection | None = Field(default=None, description="Eqs 14 and 15, symmetry.")
+    coverage: CoverageSection | None = Field(default=None, description="Views per point.")
+    depth_of_field: DepthOfFieldSection | None = Field(default=None, description="Sharpness.")
+    gsd: GsdSection | None = Field(default=None, description="Pixel size on the object.")
+    stand_off: StandOffSection | None = Field(default=None, description="Distance to the object.")
+    bodies: BodiesSection | None = Field(default=None, description="Gap between bodies.")
+    sight_lines: SightLinesSection | None = Field(default=None, description="Free views.")
+    zones: ZonesSection | None = Field(default=None, description="Where cameras may stand.")
+    motion: MotionSection | None = Field(default=None, description="Head movement.")
 
     def to_limits(self) -> Limits:
         """The limits as the solver sees them."""
@@ -246,7 +270,8 @@ class LimitsSection(StrictModel):
             spacing=_limit(self.spacing, Spacing, None, None),
             symmetry=_limit(self.symmetry, Symmetry, None, None),
             coverage=(self.coverage or CoverageSection()).to_limit(),
-            depth_of_field=default.depth_of_field if self.depth_of_field is None
+            depth_of_field=default.depth_of_field
+            if self.depth_of_field is None
             else self.depth_of_field.enabled,
             gsd_max_mm=gsd.max_mm if gsd is not None and gsd.enabled else None,
             stand_off=_limit(self.stand_off, StandOff, StandOff(), StandOff()),
@@ -259,7 +284,11 @@ class LimitsSection(StrictModel):
     @classmethod
     def from_limits(cls, limits: Limits) -> Self:
         """The section that describes ``limits``; what is off by choice says so."""
-        gsd, body, sight = limits.gsd_max_mm, limits.body_clearance_mm, limits.sight_line_clearance_mm
+        gsd, body, sight = (
+            limits.gsd_max_mm,
+            limits.body_clearance_mm,
+            limits.sight_line_clearance_mm,
+        )
         return cls(
             image_sigma_px=limits.image_sigma_px,
             bounds=_section(BoundsSection, limits.bounds),

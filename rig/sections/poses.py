@@ -21,12 +21,12 @@ class PoseSection(StrictModel):
     """Where a camera stands and where it looks, said in exactly one of three ways."""
 
     position_mm: Vector = Field(description="Projection centre in the rig frame.")
-    omega_phi_kappa_deg: Vector | None = Field(None, description="Photogrammetric angles.")
+    omega_phi_kappa_deg: Vector | None = Field(default=None, description="Photogrammetric angles.")
     rotation_rig_to_camera: Matrix | None = Field(
-        None, description="Rotation matrix, rows are the camera's x, y and z axes."
+        default=None, description="Rotation matrix, rows are the camera's x, y and z axes."
     )
     look_at_mm: Vector | None = Field(
-        None, description="Point the camera looks at, with a level image."
+        default=None, description="Point the camera looks at, with a level image."
     )
 
     @model_validator(mode="after")
@@ -62,11 +62,12 @@ class FixedSection(PoseSection):
 
     name: CameraName = Field(description="What to call this camera.")
     focus_mm: float | None = Field(
-        None, gt=0.0,
+        default=None,
+        gt=0.0,
         description="Focus setting. Without it: the camera's own, or the distance to `look_at_mm`.",
     )
     camera: CameraSection | None = Field(
-        None, description="Its own kind of camera; without it the rig's."
+        default=None, description="Its own kind of camera; without it the rig's."
     )
 
     def to_rig_camera(self, rig_camera: Camera) -> RigCamera:

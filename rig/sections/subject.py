@@ -17,12 +17,18 @@ Axis = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
 class ScanSection(StrictModel):
     """How to read the scan. What is not given is inferred, and the report says so."""
 
-    units: Literal["mm", "cm", "m", "in"] | None = Field(None, description="Unit of the file.")
-    scale: float | None = Field(None, gt=0.0, description="Millimetres per unit, instead of units.")
-    up: Axis | None = Field(None, description="Axis of the file that points up.")
-    front: Axis | None = Field(None, description="Axis of the file that the face looks along.")
+    units: Literal["mm", "cm", "m", "in"] | None = Field(
+        default=None, description="Unit of the file."
+    )
+    scale: float | None = Field(
+        default=None, gt=0.0, description="Millimetres per unit, instead of units."
+    )
+    up: Axis | None = Field(default=None, description="Axis of the file that points up.")
+    front: Axis | None = Field(
+        default=None, description="Axis of the file that the face looks along."
+    )
     subject: Literal["head", "object"] = Field(
-        "head", description="`\"head\"` expects a head's size; `\"object\"` takes anything."
+        default="head", description='`"head"` expects a head\'s size; `"object"` takes anything.'
     )
 
     def to_options(self) -> ScanOptions:
@@ -53,17 +59,19 @@ class SubjectSection(StrictModel):
     """Which part of the scan the rig is for."""
 
     region: Literal["face", "all", "targets"] = Field(
-        "face",
-        description="`\"face\"` finds the face, `\"all\"` takes the whole surface, `\"targets\"` "
+        default="face",
+        description='`"face"` finds the face, `"all"` takes the whole surface, `"targets"` '
         "takes the points of the file as they are.",
     )
-    box: RegionBox | None = Field(None, description="Take this box instead of the found region.")
-    sphere: RegionSphere | None = Field(None, description="Take this ball instead.")
+    box: RegionBox | None = Field(
+        default=None, description="Take this box instead of the found region."
+    )
+    sphere: RegionSphere | None = Field(default=None, description="Take this ball instead.")
     design_points: int | None = Field(
-        None, ge=4, le=100_000, description="How many points steer the design."
+        default=None, ge=4, le=100_000, description="How many points steer the design."
     )
     check_points: int | None = Field(
-        None, ge=4, le=200_000, description="How many points the result is judged by."
+        default=None, ge=4, le=200_000, description="How many points the result is judged by."
     )
 
     @model_validator(mode="after")
@@ -91,7 +99,9 @@ class SubjectSection(StrictModel):
         box, sphere = options.box, options.sphere
         return cls(
             region=options.region,
-            box=None if box is None else RegionBox(low_mm=box.low_mm.tolist(), high_mm=box.high_mm.tolist()),
+            box=None
+            if box is None
+            else RegionBox(low_mm=box.low_mm.tolist(), high_mm=box.high_mm.tolist()),
             sphere=None
             if sphere is None
             else RegionSphere(centre_mm=sphere.centre_mm.tolist(), radius_mm=sphere.radius_mm),

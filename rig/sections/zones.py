@@ -14,7 +14,7 @@ Use = Literal["allowed", "forbidden"]
 
 
 class _ZoneSection(StrictModel):
-    use: Use = Field(description="`\"allowed\"` or `\"forbidden\"`.")
+    use: Use = Field(description='`"allowed"` or `"forbidden"`.')
 
 
 class BoxSection(_ZoneSection):
@@ -53,9 +53,11 @@ class PlaneSection(_ZoneSection):
 
 
 class ZonesSection(StrictModel):
-    """A body lies wholly inside one allowed zone, if there are any, and outside all forbidden ones."""
+    """Inside one of the allowed zones, if there are any, and outside all forbidden ones."""
 
-    enabled: bool = Field(True, description="`false` switches the limit off and keeps its numbers.")
+    enabled: bool = Field(
+        default=True, description="`false` switches the limit off and keeps its numbers."
+    )
     box: list[BoxSection] = Field(default_factory=list, description="Boxes.")
     sphere: list[SphereSection] = Field(default_factory=list, description="Balls.")
     plane: list[PlaneSection] = Field(default_factory=list, description="Sides of planes.")
@@ -64,6 +66,7 @@ class ZonesSection(StrictModel):
         """The zones as the solver sees them."""
         if not self.enabled:
             return Zones()
+        every: list[BoxSection | SphereSection | PlaneSection]
         every = [*self.box, *self.sphere, *self.plane]
         return Zones(
             allowed=tuple(z.to_zone() for z in every if z.use == "allowed"),

@@ -70,7 +70,7 @@ def ring(count: int, radius_mm: float, stand_off_mm: float) -> tuple[RigCamera, 
         across, up = radius_mm * np.cos(turn), radius_mm * np.sin(turn)
         back = np.sqrt(stand_off_mm**2 - radius_mm**2)
         pose = Pose.looking_at(np.array([across, -back, up]), np.array([0.0, -60.0, 0.0]))
-        focus = float(np.linalg.norm(pose.position_rig_mm - [0.0, -75.0, 0.0]))
+        focus = float(np.linalg.norm(pose.position_rig_mm - [0.0, -105.0, 0.0]))
         cameras.append(RigCamera(f"cam{k + 1:02d}", camera, pose, focus))
     return tuple(cameras)
 
@@ -82,12 +82,15 @@ def _covariance(cameras: tuple[RigCamera, ...], seen: np.ndarray, points: np.nda
     for camera, mask in zip(cameras, seen, strict=True):
         jacobian = np.stack(
             [
-                (camera.camera.project(camera.pose, points + step * axis)[0]
-                 - camera.camera.project(camera.pose, points - step * axis)[0]) / (2.0 * step)
+                (
+                    camera.camera.project(camera.pose, points + step * axis)[0]
+                    - camera.camera.project(camera.pose, points - step * axis)[0]
+                )
+                / (2.0 * step)
                 for axis in np.eye(3)
             ],
             axis=2,
-        )  # fmt: skip
+        )
         weighted = np.einsum("pki,pkj->pij", jacobian, jacobian) / 0.5**2
         normal[mask] += weighted[mask]
     return np.linalg.inv(normal)
@@ -96,9 +99,9 @@ def _covariance(cameras: tuple[RigCamera, ...], seen: np.ndarray, points: np.nda
 def judge(cameras: tuple[RigCamera, ...], subject: Subject, limits: Limits) -> Quality:
     """The figures of a network, computed the plain way."""
     points, n = subject.check_points, len(cameras)
-    seen = np.array([
-        seen_by(c, points, subject.occluder, limits.incidence.ray_max_deg) for c in cameras
-    ])  # fmt: skip
+    seen = np.array(
+        [seen_by(c, points, subject.occluder, limits.incidence.ray_max_deg) for c in cameras]
+    )
     covariance = _covariance(cameras, seen, points.points_mm)
     sigma = np.sqrt(np.linalg.eigvalsh(covariance)[:, -1])
     places = np.array([c.pose.position_rig_mm for c in cameras])
@@ -115,7 +118,10 @@ def judge(cameras: tuple[RigCamera, ...], subject: Subject, limits: Limits) -> Q
         angle = np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
         pixel = depth / lens.focal_length_px
         near, far = depth_of_field_mm(
-            camera.focus_distance_mm, lens.focal_length_mm, lens.f_number, lens.circle_of_confusion_mm
+            camera.focus_distance_mm,
+            lens.focal_length_mm,
+            lens.f_number,
+            lens.circle_of_confusion_mm,
         )
         gsd.append([pixel.min(), pixel.mean(), pixel.max()])
         incidence.append([angle.mean(), angle.max()])
@@ -123,17 +129,33 @@ def judge(cameras: tuple[RigCamera, ...], subject: Subject, limits: Limits) -> Q
         focus.append([near, far])
         sharp.append((depth >= near) & (depth <= far))
         slack = float(depth.min() - near)
-        rows.append(ConstraintRow(
-            f"depth_of_field/{camera.name}", float(depth.min()), near, Sense.AT_LEAST, "mm", slack,
-            abs(slack) < 0.5, slack >= 0.0,
-        ))  # fmt: skip
+        rows.append(
+            ConstraintRow(
+                f"depth_of_field/{camera.name}",
+                float(depth.min()),
+                near,
+                Sense.AT_LEAST,
+                "mm",
+                slack,
+                abs(slack) < 0.5,
+                slack >= 0.0,
+            )
+        )
     for i in range(n):
         for j in range(i):
             slack = float(base[i, j] / ((away[i] + away[j]) / 2.0) - 0.1)
-            rows.append(ConstraintRow(
-                f"base_height_min/{cameras[j].name}-{cameras[i].name}", slack + 0.1, 0.1,
-                Sense.AT_LEAST, "", slack, abs(slack) < 1e-4, slack >= 0.0,
-            ))  # fmt: skip
+            rows.append(
+                ConstraintRow(
+                    f"base_height_min/{cameras[j].name}-{cameras[i].name}",
+                    slack + 0.1,
+                    0.1,
+                    Sense.AT_LEAST,
+                    "",
+                    slack,
+                    abs(slack) < 1e-4,
+                    slack >= 0.0,
+                )
+            )
     views = seen.sum(axis=0)
     in_focus = np.zeros_like(views)
     for mask, good in zip(seen, sharp, strict=True):
@@ -152,14 +174,22 @@ def judge(cameras: tuple[RigCamera, ...], subject: Subject, limits: Limits) -> Q
         base_height=base / heights,
         convergence_deg=convergence,
         cameras=CameraTable(
-            seen.sum(axis=1), np.array(gsd), np.array(incidence), np.array(depths), np.array(focus), away, gaps
+            seen.sum(axis=1),
+            np.array(gsd),
+            np.array(incidence),
+            np.array(depths),
+            np.array(focus),
+            away,
+            gaps,
         ),
         points=PointTable(points, covariance, sigma, views, in_focus),
         constraints=tuple(rows),
     )
 
 
-def make_design(cameras: tuple[RigCamera, ...], start: tuple[RigCamera, ...], subject: Subject) -> Design:
+def make_design(
+    cameras: tuple[RigCamera, ...], start: tuple[RigCamera, ...], subject: Subject
+) -> Design:
     limits = example_rig("face").limits
     quality, before = judge(cameras, subject, limits), judge(start, subject, limits)
     starts = (
@@ -167,7 +197,15 @@ def make_design(cameras: tuple[RigCamera, ...], start: tuple[RigCamera, ...], su
         StartReport(1, "jittered", False, quality.cost_mm2 * 1.2, 0.01, 55, 4, "iteration limit"),
     )
     report = SolverReport(
-        "ipopt", Status.CONVERGED, "first-order optimum within tolerance", 3.2e-9, 40, 3, 7, 1.234, starts
+        "ipopt",
+        Status.CONVERGED,
+        "first-order optimum within tolerance",
+        3.2e-9,
+        40,
+        3,
+        7,
+        1.234,
+        starts,
     )
     return Design(cameras, quality, start, before, limits, report)
 
