@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from importlib.resources import files
+from string import Template
 from typing import TYPE_CHECKING, Any
 
 from geometry.scan import ScanNote
 from geometry.subject import Subject
 from rig.figures import number
 from rig.layout import Layout
-from rig.report import sections
+from rig.report import sections, summary
 from rig.report.ellipsoids import (
     LARGEST_SHARE,
     SHOWN,
@@ -64,23 +65,56 @@ def render_report(
     ``title`` and ``scan_name`` may hold anything: they are escaped. ``document.body.dataset``
     gets ``view``, a JSON summary of what is drawn, and ``ready`` once the figures stand.
     """
+    # Imported here: plotly costs a second, and only a report needs it.
+    from plotly.offline import get_plotlyjs
+
     figures = _figures(design, subject, layout)
-    body = "".join(
-        (
-            sections.verdict(design, layout),
-            sections.tiles(design, layout),
-            sections.rig(),
-            sections.accuracy(design),
-            sections.ellipsoids(design, figures.before, figures.after, figures.factor),
-            sections.footprints(design, subject),
-            sections.limits(design),
-            sections.cameras(design),
-            sections.mounts(design, layout, subject),
-            sections.solver(design),
-            sections.scan(notes, scan_name),
-        )
+    return Template(_part("page.html")).substitute(
+        policy=POLICY,
+        title=esc(title),
+        style=_part("style.css"),
+        view=esc(json.dumps(_view(design, figures), allow_nan=False)),
+        header=summary.heading(title, scan_name, design),
+        main=_main(design, subject, layout, figures, notes, scan_name),
+        footer=sections.colophon(design),
+        plotly=get_plotlyjs(),
+        figures=_figures_json(figures.plots),
+        script=_part("page.js"),
     )
-    summary = {
+
+
+def _part(name: str) -> str:
+    return files("rig.report").joinpath(name).read_text(encoding="utf-8")
+
+
+def _main(
+    design: Design,
+    subject: Subject,
+    layout: Layout,
+    figures: _Figures,
+    notes: tuple[ScanNote, ...],
+    scan_name: str,
+) -> str:
+    """All sections in their order."""
+    parts = (
+        summary.verdict(design, layout),
+        summary.tiles(design, layout),
+        sections.rig(),
+        sections.accuracy(design),
+        sections.ellipsoids(design, figures.before, figures.after, figures.factor),
+        sections.footprints(design, subject),
+        sections.limits(design),
+        sections.cameras(design),
+        sections.mounts(design, layout, subject),
+        sections.solver(design),
+        sections.scan(notes, scan_name),
+    )
+    return "".join(parts)
+
+
+def _view(design: Design, figures: _Figures) -> dict[str, Any]:
+    """What is drawn, in numbers: lets a test, or a reader's script, check the page."""
+    return {
         "cameras": len(design.cameras),
         "ellipsoids": len(figures.after.rows),
         "ellipsoids_before": len(figures.before.rows),
@@ -88,7 +122,6 @@ def render_report(
         "limits": len(design.quality.constraints),
         "sigma_median_mm": number(design.quality.sigma_median_mm),
     }
-    return _document(title, scan_name, design, body, figures.plots, summary)
 
 
 def _figures(design: Design, subject: Subject, layout: Layout) -> _Figures:
@@ -100,9 +133,7 @@ def _figures(design: Design, subject: Subject, layout: Layout) -> _Figures:
     radius = after.points.radius_mm
     factor = exaggeration(after, radius)
     sample = spread_sample(after.points.points_mm, SHOWN)
-    same = before.points is after.points or len(before.sigma_mm) == len(after.sigma_mm)
-    earlier = sample if same else spread_sample(before.points.points_mm, SHOWN)
-    drawn_before = ellipsoids(before, earlier, factor, LARGEST_SHARE * radius)
+    drawn_before = ellipsoids(before, sample, factor, LARGEST_SHARE * radius)
     drawn_after = ellipsoids(after, sample, factor, LARGEST_SHARE * radius)
     plots = {
         "rig-3d": rig_figure(design, mesh, layout, limits),
@@ -113,53 +144,12 @@ def _figures(design: Design, subject: Subject, layout: Layout) -> _Figures:
     return _Figures(plots, drawn_before, drawn_after, factor, len(mesh.faces))
 
 
-def _document(
-    title: str,
-    scan_name: str,
-    design: Design,
-    body: str,
-    plots: dict[str, Any],
-    summary: dict[str, Any],
-) -> str:
-    # Imported here: plotly costs a second, and only a report needs it.
-    from plotly.offline import get_plotlyjs
-
-    here = files("rig.report")
-    style = here.joinpath("style.css").read_text(encoding="utf-8")
-    script = here.joinpath("page.js").read_text(encoding="utf-8")
-    data = (
-        "{"
-        + ",".join(f"{json.dumps(key)}:{_figure_json(plot)}" for key, plot in plots.items())
-        + "}"
-    )
-    view = esc(json.dumps(summary, allow_nan=False))
-    return f"""<!doctype html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<meta http-equiv="Content-Security-Policy" content="{POLICY}">
-<meta name="generator" content="Rigwright">
-<title>{esc(title)}</title>
-<link rel="icon" href="data:,">
-<style>{style}</style>
-</head>
-<body data-view="{view}">
-<header>{sections.heading(title, scan_name, design)}</header>
-<main>{body}</main>
-<footer>{sections.colophon(design)}</footer>
-<script>{get_plotlyjs()}</script>
-<script type="application/json" id="figures">{data}</script>
-<script>{script}</script>
-</body>
-</html>
-"""
-
-
-def _figure_json(plot: go.Figure) -> str:
-    """A figure as JSON that may stand inside a script element, whatever names it holds."""
-    # The default template would double the page's figures with styles the page overrides.
-    plot.update_layout(template="none")
-    return (
-        str(plot.to_json()).replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
-    )
+def _figures_json(plots: dict[str, go.Figure]) -> str:
+    """The figures as JSON that may stand inside a script element, whatever names they hold."""
+    parts = []
+    for key, plot in plots.items():
+        # The default template would double the figures with styles the page overrides.
+        plot.update_layout(template="none")
+        parts.append(f"{json.dumps(key)}:{plot.to_json()}")
+    text = "{" + ",".join(parts) + "}"
+    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from geometry.arrays import Floats, Ints
+from geometry.arrays import Floats
 from geometry.camera import RigCamera
 from rig.bodies import place_body
 from rig.layout import Layout
-from rig.report.colours import AFTER, BEFORE, BODY, FIXED, GOOD_TO_BAD, SKIN
+from rig.report.colours import AFTER, BEFORE, BODY, FIXED
 from rig.report.markup import esc, figure_text
+from rig.report.subjectview import subject_traces
 from rig.report.surface import ViewMesh
-from rig.report.three import SOFT, lines_trace, mesh_trace, scene_layout
+from rig.report.three import lines_trace, mesh_trace, scene_layout
 from rig.scene import frustum_corners_mm
-from solver.result import Design, PointTable
+from solver.result import Design
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
@@ -30,7 +31,7 @@ def rig_figure(
     """The main figure."""
     import plotly.graph_objects as go
 
-    figure = go.Figure(_subject_traces(mesh, design.quality.points, limits))
+    figure = go.Figure(subject_traces(mesh, design.quality.points, limits))
     for index, camera in enumerate(design.cameras):
         figure.add_trace(_body_trace(design, layout, index, camera))
     centre = design.quality.points.points.centroid_mm
@@ -42,102 +43,22 @@ def rig_figure(
     start = _view_edges(design.start_cameras, centre)
     figure.add_trace(lines_trace(start, BEFORE, "start, before optimisation", visible="legendonly"))
     figure.add_trace(_names(design.cameras))
-    datum = layout.datum_rig_mm
-    figure.add_trace(
-        go.Scatter3d(
-            x=datum[:1],
-            y=datum[1:2],
-            z=datum[2:],
-            mode="markers",
-            name="datum",
-            marker={"size": 5, "symbol": "diamond", "color": "#c81e1e"},
-            hovertemplate="datum<extra></extra>",
-        )
-    )
+    figure.add_trace(_datum(layout))
+    legend = {"orientation": "h", "x": 0.0, "y": 0.0, "yanchor": "top", "bgcolor": "rgba(0,0,0,0)"}
     figure.update_layout(**scene_layout(1.02))
-    figure.update_layout(
-        legend={
-            "orientation": "h",
-            "x": 0.0,
-            "y": 0.0,
-            "yanchor": "top",
-            "bgcolor": "rgba(0,0,0,0)",
-        },
-        margin={"l": 0, "r": 0, "t": 0, "b": 60},
-    )
+    figure.update_layout(legend=legend, margin={"l": 0, "r": 0, "t": 0, "b": 60})
     return figure
 
 
-def _subject_traces(mesh: ViewMesh, table: PointTable, limits: tuple[float, float]) -> list[Any]:
+def _datum(layout: Layout) -> go.Scatter3d:
     import plotly.graph_objects as go
 
-    bar = {
-        "title": {"text": "σ mm", "side": "top"},
-        "orientation": "h",
-        "thickness": 10,
-        "len": 0.42,
-        "x": 0.0,
-        "xanchor": "left",
-        "y": 1.0,
-        "yanchor": "top",
-        "outlinewidth": 0,
-        "nticks": 5,
-    }
-    colours = {"colorscale": GOOD_TO_BAD, "cmin": limits[0], "cmax": limits[1], "colorbar": bar}
-    if len(mesh.faces) == 0:
-        x, y, z = table.points.points_mm.T
-        marker = {"size": 5, "color": table.sigma_mm, **colours}
-        return [
-            go.Scatter3d(
-                x=x,
-                y=y,
-                z=z,
-                mode="markers",
-                marker=marker,
-                text=_words(table),
-                name="points",
-                hovertemplate="%{text}<extra></extra>",
-                showlegend=False,
-            )
-        ]
-    rest, region = mesh.faces[~mesh.in_region], mesh.faces[mesh.in_region]
-    used, region = _only_used(region)
-    nearest = mesh.nearest[used]
-    words = _words(table)
-    traces = (
-        [mesh_trace(mesh.vertices_mm, rest, SKIN, "head", hoverinfo="skip")] if len(rest) else []
+    x, y, z = layout.datum_rig_mm[:, None]
+    marker = {"size": 5, "symbol": "diamond", "color": "#c81e1e"}
+    words = "datum<extra></extra>"
+    return go.Scatter3d(
+        x=x, y=y, z=z, mode="markers", name="datum", marker=marker, hovertemplate=words
     )
-    if len(region):
-        x, y, z = mesh.vertices_mm[used].T.astype(np.float32)
-        i, j, k = region.T.astype(np.uint16 if len(used) < 65_536 else np.uint32)
-        traces.append(
-            go.Mesh3d(
-                x=x,
-                y=y,
-                z=z,
-                i=i,
-                j=j,
-                k=k,
-                intensity=table.sigma_mm[nearest].astype(np.float32),
-                text=[words[n] for n in nearest],
-                hovertemplate="%{text}<extra></extra>",
-                lighting=SOFT,
-                lightposition={"x": -4000, "y": -12000, "z": 9000},
-                name="region",
-                showscale=True,
-                **colours,
-            )
-        )
-    return traces
-
-
-def _words(table: PointTable) -> list[str]:
-    return [f"σ {s:.3f} mm, {v} views" for s, v in zip(table.sigma_mm, table.views, strict=True)]
-
-
-def _only_used(faces: Ints) -> tuple[Ints, Ints]:
-    used, renumbered = np.unique(faces, return_inverse=True)
-    return used.astype(np.int64), renumbered.reshape(faces.shape).astype(np.int64)
 
 
 def _body_trace(design: Design, layout: Layout, index: int, camera: RigCamera) -> go.Mesh3d:

@@ -12,6 +12,8 @@ if TYPE_CHECKING:
     import plotly.graph_objects as go
 
 SOFT = {"ambient": 0.55, "diffuse": 0.75, "specular": 0.05, "roughness": 0.9, "fresnel": 0.05}
+LAMP = {"x": -4000, "y": -12000, "z": 9000}
+"""Above the left shoulder of a viewer behind the cameras."""
 
 
 def mesh_trace(
@@ -22,8 +24,7 @@ def mesh_trace(
 
     x, y, z = np.asarray(vertices_mm).T.astype(np.float32)
     i, j, k = np.asarray(faces).T.astype(np.uint16 if len(vertices_mm) < 65_536 else np.uint32)
-    lamp = {"x": -4000, "y": -12000, "z": 9000}
-    options = {"color": colour, "lighting": SOFT, "lightposition": lamp, "name": name} | more
+    options = {"color": colour, "lighting": SOFT, "lightposition": LAMP, "name": name} | more
     return go.Mesh3d(x=x, y=y, z=z, i=i, j=j, k=k, **options)
 
 
