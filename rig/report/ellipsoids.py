@@ -81,7 +81,8 @@ def ellipsoid_figure(
     import plotly.graph_objects as go
 
     figure = go.Figure()
-    near = _near_region(mesh, table)
+    low, high = _surroundings(table)
+    near = _near_region(mesh, low, high)
     if len(near):
         figure.add_trace(mesh_trace(mesh.vertices_mm, near, SKIN, "head", hoverinfo="skip"))
     if len(shown.rows):
@@ -99,19 +100,27 @@ def ellipsoid_figure(
                 hovertemplate="fewer than two views<extra></extra>",
             )
         )
-    figure.update_layout(**scene_layout(1.12, axes=False), showlegend=False)
+    figure.update_layout(**scene_layout(1.6, axes=False), showlegend=False)
+    # Fixed ranges: figures that fit themselves to their longest ellipsoid cannot be compared.
+    ranges = {f"{axis}axis_range": [low[k], high[k]] for k, axis in enumerate("xyz")}
+    figure.update_scenes(**ranges)
     return figure
 
 
-def _near_region(mesh: ViewMesh, table: PointTable) -> Ints:
+def _surroundings(table: PointTable) -> tuple[Floats, Floats]:
+    """Corners (3,) of a box about the region with room for the longest ellipsoid."""
+    points = table.points.points_mm
+    margin = max(0.22 * float(np.ptp(points, axis=0).max()), LARGEST_SHARE * table.points.radius_mm)
+    return points.min(axis=0) - margin, points.max(axis=0) + margin
+
+
+def _near_region(mesh: ViewMesh, low: Floats, high: Floats) -> Ints:
     """Faces (F, 3) about the region: shoulders and the back of a head only make it small."""
     if len(mesh.faces) == 0:
         return mesh.faces
-    points = table.points.points_mm
-    margin = 0.22 * np.ptp(points, axis=0).max()
-    low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
-    inside = ((mesh.vertices_mm >= low) & (mesh.vertices_mm <= high)).all(axis=1)
-    return np.asarray(mesh.faces[inside[mesh.faces].all(axis=1)])
+    within = (mesh.vertices_mm >= low) & (mesh.vertices_mm <= high)
+    inside = np.all(within, axis=1)
+    return np.asarray(mesh.faces[np.all(inside[mesh.faces], axis=1)])
 
 
 def _solid(table: PointTable, shown: Ellipsoids, limits: tuple[float, float]) -> go.Mesh3d:

@@ -67,43 +67,30 @@ def _tile(name: str, figure: str, note: str) -> str:
 
 def tiles(design: Design, layout: Layout) -> str:
     """The figures that are asked for first."""
-    quality, start = design.quality, design.start_quality
-    width, depth, height = (f"{v:.0f}" for v in layout.envelope_size_mm)
-    sigma, before = quality.sigma_median_mm, start.sigma_median_mm
-    two, three = tables.lowest_coverage(quality, 2), tables.lowest_coverage(quality, 3)
+    quality, before = design.quality, design.start_quality.sigma_median_mm
+    two, three = (percent(tables.share_seen(quality, views)) for views in (2, 3))
     gsd = quality.cameras.gsd_mm[:, 1]
     mean_gsd = float(gsd[gsd == gsd].mean()) if (gsd == gsd).any() else math.nan
-    return (
-        '<div class="tiles">'
-        + "".join(
-            (
-                _tile(
-                    "Median error σ",
-                    f"{figure_text(sigma)} <small>mm</small>",
-                    f"{figure_text(before)} mm at the start",
-                ),
-                _tile(
-                    "95 % of points below",
-                    f"{figure_text(quality.sigma_p95_mm)} <small>mm</small>",
-                    f"largest {figure_text(quality.sigma_max_mm)} mm",
-                ),
-                _tile("Seen by two or more", percent(two), f"by three or more: {percent(three)}"),
-                _tile(
-                    "Sharp",
-                    percent(quality.in_focus_share),
-                    f"in frame: {percent(quality.in_frame_share)}",
-                ),
-                _tile(
-                    "Pixel on the subject",
-                    f"{figure_text(mean_gsd)} <small>mm</small>",
-                    "mean over the cameras",
-                ),
-                _tile(
-                    "Room the array takes",
-                    f"{width} × {depth} × {height}",
-                    "mm: width, depth, height",
-                ),
-            )
-        )
-        + "</div>"
+    frame, sigma = percent(quality.in_frame_share), quality.sigma_median_mm
+    largest = figure_text(quality.sigma_max_mm)
+    parts = (
+        _tile("Median error σ", _mm(sigma), f"{figure_text(before)} mm at the start"),
+        _tile("95 % of points below", _mm(quality.sigma_p95_mm), f"largest {largest} mm"),
+        _tile("Seen by two or more", two, f"by three or more: {three}"),
+        _tile("Sharp", percent(quality.in_focus_share), f"in frame: {frame}"),
+        _tile("Pixel on the subject", _mm(mean_gsd), "mean over the cameras"),
+        _tile("Room the array takes", *_room(layout)),
     )
+    return f'<div class="tiles">{"".join(parts)}</div>'
+
+
+def _mm(value: float) -> str:
+    return f"{figure_text(value)} <small>mm</small>"
+
+
+def _room(layout: Layout) -> tuple[str, str]:
+    """Envelope of the array, in metres when it is as large as a hall."""
+    size = layout.envelope_size_mm
+    if size.max() >= 10_000.0:
+        return " × ".join(f"{v / 1000.0:.1f}" for v in size), "m: width, depth, height"
+    return " × ".join(f"{v:.0f}" for v in size), "mm: width, depth, height"

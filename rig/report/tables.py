@@ -258,6 +258,6 @@ def _neighbour(neighbour: Neighbour | None) -> str:
     return f"{figure_text(neighbour.clearance_mm)} mm <small>{esc(neighbour.name)}</small>"
 
 
-def lowest_coverage(quality: Quality, views: int) -> float:
+def share_seen(quality: Quality, views: int) -> float:
     """Share of points with so many views or more; NaN when the figures do not say."""
     return next((c.share for c in quality.coverage if c.views == views), float("nan"))
