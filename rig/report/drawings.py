@@ -18,7 +18,7 @@ from rig.sight import outline, seen_by
 BEYOND = 0.12
 """How much of the surroundings of an image is drawn, as a share of its width."""
 
-DOTS = 220
+DOTS = 160
 
 
 def _dot(css: str, x: float, y: float, radius: float) -> str:
@@ -45,7 +45,7 @@ def footprint(
     after = _seen_pixels(camera, subject, ray_max_deg)
     parts = [f'<rect class="frame" x="-0.5" y="-0.5" width="{width}" height="{height}"/>']
     step = max(1, len(after) // DOTS)
-    parts += [_dot("dot", x, y, width / 220.0) for x, y in after[::step]]
+    parts += [_dot("dot", round(x), round(y), width / 220.0) for x, y in after[::step]]
     parts.append(_outlined("after", after))
     if start is not None:
         parts.append(_outlined("before", _seen_pixels(start, subject, ray_max_deg)))

@@ -16,17 +16,17 @@ if TYPE_CHECKING:
     import plotly.graph_objects as go
 
 PIXELS = np.float32
-NOTHING = 255
-"""Value of a shade's pixel where there is no subject. Shades are bytes: a quarter of the size."""
+SHADES = 255
+"""Shades are bytes from 1 to this, a quarter of the size of floats; 0 is where nothing is."""
 
+NOTHING = [[0.0, "rgba(0,0,0,0)"], [0.5 / SHADES, "rgba(0,0,0,0)"]]
 SHADE_SCALE = [
-    [0.0, "rgba(0,0,0,0)"],
+    *NOTHING,
+    [0.5 / SHADES, "rgba(0,0,0,0)"],
     [0.3, "rgba(0,0,0,0.05)"],
-    [254 / 255, "rgba(0,0,0,0.62)"],
-    [254 / 255, "rgba(0,0,0,0)"],
-    [1.0, "rgba(0,0,0,0)"],
+    [1.0, "rgba(0,0,0,0.62)"],
 ]
-GREY_SCALE = [[0.0, "#b9bcc4"], [0.5, "#b9bcc4"], [0.5, "rgba(0,0,0,0)"], [1.0, "rgba(0,0,0,0)"]]
+GREY_SCALE = [*NOTHING, [0.5 / SHADES, "#b9bcc4"], [1.0, "#b9bcc4"]]
 
 
 def sigma_range_mm(table: PointTable) -> tuple[float, float]:
@@ -89,9 +89,9 @@ def _map(view: FrontView, values: Floats, limits: tuple[float, float] | None) ->
     scale = _scale(limits)
     place = {"x": view.x_mm.round(2), "y": view.z_mm.round(2)}
     word = "σ %{z:.3f} mm" if limits is not None else "%{z:.0f} views"
-    skin = np.where(view.on_subject, 0, NOTHING).astype(np.uint8)
-    shade = np.where(view.on_subject, np.round(view.shade * 254.0), NOTHING).astype(np.uint8)
-    under = {"zmin": 0, "zmax": NOTHING, "showscale": False, "hoverinfo": "skip"}
+    skin = np.where(view.on_subject, 1, 0).astype(np.uint8)
+    shade = np.where(view.on_subject, 1.0 + np.round(view.shade * (SHADES - 1)), 0).astype(np.uint8)
+    under = {"zmin": 0, "zmax": SHADES, "showscale": False, "hoverinfo": "skip"}
     figure = go.Figure(
         [
             go.Heatmap(z=skin, **place, **under, colorscale=GREY_SCALE),
