@@ -201,9 +201,12 @@ def solver(design: Design) -> str:
         f"The solver ({esc(report.engine)}) {status}: {esc(report.why_stopped)}. "
         f"{report.iterations} iterations in {report.rounds} rounds, KKT error "
         f"{figure_text(report.kkt_error, 2)} (how far the result is from an exact optimum), "
-        f"{figure_text(report.seconds)} s, seed {report.seed}. The best start that holds all "
-        "limits won."
+        f"{figure_text(report.seconds)} s, seed {report.seed}."
     )
+    if any(start.feasible for start in report.starts):
+        words += " The best start that holds all limits won."
+    elif report.starts:
+        words += " No start led to a design that holds all limits; the nearest is shown."
     content = tables.starts_table(report) if report.starts else ""
     if report.conflicts:
         content = (

@@ -8,8 +8,9 @@ from geometry.arrays import Floats
 from rig.layout import Layout, Neighbour
 from rig.report.markup import element, esc, figure_text, percent, table
 from rig.report.words import family_words
-from solver.result import ConstraintRow, Design, Quality, SolverReport
+from solver.result import ConstraintRow, Design, Quality, Sense, SolverReport
 
+SENSES = {Sense.AT_MOST: "≤", Sense.AT_LEAST: "≥", Sense.EQUAL: "="}
 SHOWN_ROWS = 40
 """Limits that are open to the eye at once; the rest is one click away."""
 
@@ -45,22 +46,33 @@ def _constraints(rows: list[ConstraintRow]) -> str:
         elif row.active:
             state = "binds"
         title, words = family_words(row.family)
-        subject = (
-            "" if row.subject == row.family else f' <span class="who">{esc(row.subject)}</span>'
-        )
+        who = "" if row.subject in (row.family, "all") else row.subject
+        subject = f' <span class="who">{esc(who)}</span>' if who else ""
         unit = f" {esc(row.unit)}" if row.unit else ""
-        sense = {"<=": "≤", ">=": "≥", "==": "="}[str(row.sense)]
         cells.append(
             (
                 element("span", esc(title), title=words) + subject,
                 figure_text(row.value, 4) + unit,
-                f"{sense} {figure_text(row.limit, 4)}{unit}",
-                figure_text(row.slack, 3) + unit,
+                _asked(row) + unit,
+                figure_text(_without_rounding(row.slack, row.limit)) + unit,
                 f'<span class="badge {state}">{state}</span>',
             )
         )
         css.append(state)
     return table(("Limit", "Value", "Asked for", "Slack", "State"), cells, row_css=css)
+
+
+def _asked(row: ConstraintRow) -> str:
+    """Sense and limit; an equality with its tolerance, which slack and deviation add up to."""
+    words = f"{SENSES[row.sense]} {figure_text(row.limit, 4)}"
+    tolerance = _without_rounding(row.slack + abs(row.value - row.limit), row.limit)
+    banded = row.sense is Sense.EQUAL and tolerance > 0.0
+    return f"{words} ± {figure_text(tolerance)}" if banded else words
+
+
+def _without_rounding(value: float, scale: float) -> float:
+    """Zero for what is only rounding beside ``scale``."""
+    return 0.0 if abs(value) <= 1e-6 * max(abs(scale), 1e-3) else value
 
 
 def camera_table(design: Design) -> str:

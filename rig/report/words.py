@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 FAMILIES: dict[str, tuple[str, str]] = {
-    "bounds": ("Bounds", "How far a camera may move or turn from its start (Eq 8)."),
+    "bound": ("Bounds", "How far a camera may move or turn from its start (Eq 8)."),
     "base_height": (
         "Base/height",
         "Distance of two cameras over their distance to the subject (Eq 9).",
@@ -32,6 +32,7 @@ ENDS = {
     "max": "greatest",
     "mean min": "least mean",
     "mean max": "greatest mean",
+    "neighbour": "nearest neighbour",
 }
 
 
@@ -43,5 +44,5 @@ def family_words(family: str) -> tuple[str, str]:
     key = max(known, key=len)
     title, words = FAMILIES[key]
     rest = family[len(key) :].strip("_").replace("_", " ")
-    rest = ENDS.get(rest, rest)
+    rest = f"{rest} or more views" if rest.isdigit() else ENDS.get(rest, rest)
     return f"{title}, {rest}" if rest else title, words

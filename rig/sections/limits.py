@@ -103,7 +103,7 @@ class IncidenceSection(Switched):
     """Eq 10: angle of incidence. The switch turns off the mean; ``ray_max_deg`` stays."""
 
     ray_max_deg: float = Field(
-        default=75.0,
+        default=Incidence().ray_max_deg,
         ge=0.0,
         le=89.0,
         description="A point counts as seen up to this angle between its normal and the ray. "
@@ -168,7 +168,7 @@ class CoverageSection(Switched):
     """How often points must be seen. The switch turns off the tiers."""
 
     unseen_sigma_mm: float = Field(
-        default=10.0,
+        default=Coverage().unseen_sigma_mm,
         gt=0.0,
         description="Standard deviation of a point before anybody looks: what losing it costs.",
     )
@@ -238,7 +238,9 @@ class LimitsSection(StrictModel):
     """Everything the rig must respect."""
 
     image_sigma_px: float = Field(
-        default=0.5, gt=0.0, description="Standard deviation of an image measurement."
+        default=Limits().image_sigma_px,
+        gt=0.0,
+        description="Standard deviation of an image measurement.",
     )
     bounds: BoundsSection | None = Field(default=None, description="Eq 8, bounds about the start.")
     base_height: BaseHeightSection | None = Field(default=None, description="Eq 9, base/height.")

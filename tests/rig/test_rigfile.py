@@ -39,7 +39,7 @@ def test_the_face_example_is_the_papers_camera() -> None:
     # 2 atan(4000 * 5.77 um / (2 * 50 mm)) = 25.99 degrees.
     assert spec.camera.field_of_view_deg[0] == pytest.approx(26.0, abs=0.05)
     assert spec.camera.body.size_mm.tolist() == [62.0, 45.0, 32.0]
-    assert spec.limits.centring is None, "the table is there, switched off"
+    assert spec.limits.spacing is None, "the table is there, switched off"
 
 
 def test_examples_in_the_folder_are_those_of_the_package(repo: Path) -> None:
