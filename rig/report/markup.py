@@ -1,0 +1,74 @@
+"""HTML by hand, safely: every text that is not ours goes through :func:`esc`."""
+
+from __future__ import annotations
+
+import html
+import math
+from collections.abc import Iterable, Sequence
+
+
+def esc(text: object) -> str:
+    """``text`` as it may stand in HTML, in attributes too."""
+    return html.escape(str(text), quote=True)
+
+
+def figure_text(value: float, digits: int = 3) -> str:
+    """A number for people: ``digits`` significant ones, a dash for none, the infinity sign."""
+    if math.isnan(value):
+        return "–"
+    if math.isinf(value):
+        return "∞"
+    if value == 0.0:
+        return "0"
+    whole = len(str(int(abs(value)))) if abs(value) >= 1.0 else 0
+    if whole == 0 and abs(value) < 1e-4:
+        return f"{value:.1e}".replace("-", "−")
+    decimals = max(0, digits - whole) if whole else digits - 1 - math.floor(math.log10(abs(value)))
+    return f"{value:.{decimals}f}".replace("-", "−")
+
+
+def percent(share: float) -> str:
+    """A share as a percentage; 100 only when it is all of them."""
+    if math.isnan(share):
+        return "–"
+    text = f"{100.0 * share:.1f}"
+    return "99.9 %" if text == "100.0" and share < 1.0 else f"{text.removesuffix('.0')} %"
+
+
+def element(tag: str, content: str, **attributes: str) -> str:
+    """An element; ``content`` is HTML already, attribute values are not."""
+    names = {name.rstrip("_").replace("_", "-"): value for name, value in attributes.items()}
+    spelt = "".join(f' {name}="{esc(value)}"' for name, value in names.items())
+    return f"<{tag}{spelt}>{content}</{tag}>"
+
+
+def table(
+    head: Sequence[str],
+    rows: Iterable[Sequence[str]],
+    *,
+    css: str = "",
+    row_css: Sequence[str] = (),
+) -> str:
+    """A table in a box that scrolls by itself; all cells are HTML already."""
+    top = "".join(f'<th scope="col">{cell}</th>' for cell in head)
+    body = []
+    for i, row in enumerate(rows):
+        cells = "".join(f"<td>{cell}</td>" for cell in row)
+        mark = f' class="{esc(row_css[i])}"' if i < len(row_css) and row_css[i] else ""
+        body.append(f"<tr{mark}>{cells}</tr>")
+    inner = f"<table><thead><tr>{top}</tr></thead><tbody>{''.join(body)}</tbody></table>"
+    return f'<div class="table {esc(css)}">{inner}</div>'
+
+
+def section(key: str, title: str, words: str, *content: str) -> str:
+    """A section of the page: heading, explaining words (HTML), then the figures."""
+    lead = f'<p class="lead">{words}</p>' if words else ""
+    return f'<section id="{esc(key)}"><h2>{esc(title)}</h2>{lead}{"".join(content)}</section>'
+
+
+def plot(key: str, caption: str, css: str = "") -> str:
+    """The place of a plotly figure, which the page's script draws."""
+    return (
+        f'<figure class="plot {esc(css)}"><figcaption>{caption}</figcaption>'
+        f'<div class="canvas" id="{esc(key)}"></div></figure>'
+    )

@@ -1,0 +1,155 @@
+"""The page: sections in order, texts, figures, and everything inlined into one file."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from importlib.resources import files
+from string import Template
+from typing import TYPE_CHECKING, Any
+
+from geometry.scan import ScanNote
+from geometry.subject import Subject
+from rig.figures import number
+from rig.layout import Layout
+from rig.report import sections, summary
+from rig.report.ellipsoids import (
+    LARGEST_SHARE,
+    SHOWN,
+    Ellipsoids,
+    ellipsoid_figure,
+    ellipsoids,
+    exaggeration,
+    spread_sample,
+)
+from rig.report.errormap import error_maps, sigma_range_mm
+from rig.report.markup import esc
+from rig.report.rigview import rig_figure
+from rig.report.surface import RegionLookup, view_mesh
+from solver.result import Design
+
+if TYPE_CHECKING:
+    import plotly.graph_objects as go
+
+POLICY = (
+    "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval'; style-src 'unsafe-inline'; "
+    "img-src data: blob:; font-src data:"
+)
+"""The page loads nothing from anywhere; plotly compiles its shaders' glue, hence eval."""
+
+SMALL_HEAD_FACES = 9_000
+
+
+@dataclass(frozen=True)
+class _Figures:
+    """Plotly figures by the key of their place, and what the texts say about them."""
+
+    plots: dict[str, go.Figure]
+    before: Ellipsoids
+    after: Ellipsoids
+    factor: float
+    triangles: int
+
+
+def render_report(
+    design: Design,
+    subject: Subject,
+    layout: Layout,
+    *,
+    title: str = "Rig design",
+    scan_name: str = "",
+    notes: tuple[ScanNote, ...] = (),
+) -> str:
+    """The report as one HTML document that needs no network.
+
+    ``title`` and ``scan_name`` may hold anything: they are escaped. ``document.body.dataset``
+    gets ``view``, a JSON summary of what is drawn, and ``ready`` once the figures stand.
+    """
+    # Imported here: plotly costs a second, and only a report needs it.
+    from plotly.offline import get_plotlyjs
+
+    figures = _figures(design, subject, layout)
+    return Template(_part("page.html")).substitute(
+        policy=POLICY,
+        title=esc(title),
+        style=_part("style.css"),
+        view=esc(json.dumps(_view(design, figures), allow_nan=False)),
+        header=summary.heading(title, scan_name, design),
+        main=_main(design, subject, layout, figures, notes, scan_name),
+        footer=sections.colophon(design),
+        plotly=get_plotlyjs(),
+        figures=_figures_json(figures.plots),
+        script=_part("page.js"),
+    )
+
+
+def _part(name: str) -> str:
+    return files("rig.report").joinpath(name).read_text(encoding="utf-8")
+
+
+def _main(
+    design: Design,
+    subject: Subject,
+    layout: Layout,
+    figures: _Figures,
+    notes: tuple[ScanNote, ...],
+    scan_name: str,
+) -> str:
+    """All sections in their order."""
+    parts = (
+        summary.verdict(design, layout),
+        summary.tiles(design, layout),
+        sections.rig(),
+        sections.accuracy(design),
+        sections.ellipsoids(design, figures.before, figures.after, figures.factor),
+        sections.footprints(design, subject),
+        sections.limits(design),
+        sections.cameras(design),
+        sections.mounts(design, layout, subject),
+        sections.solver(design),
+        sections.scan(notes, scan_name),
+    )
+    return "".join(parts)
+
+
+def _view(design: Design, figures: _Figures) -> dict[str, Any]:
+    """What is drawn, in numbers: lets a test, or a reader's script, check the page."""
+    return {
+        "cameras": len(design.cameras),
+        "ellipsoids": len(figures.after.rows),
+        "ellipsoids_before": len(figures.before.rows),
+        "triangles": figures.triangles,
+        "limits": len(design.quality.constraints),
+        "sigma_median_mm": number(design.quality.sigma_median_mm),
+    }
+
+
+def _figures(design: Design, subject: Subject, layout: Layout) -> _Figures:
+    before, after = design.start_quality.points, design.quality.points
+    lookup = RegionLookup(after)
+    mesh = view_mesh(subject, lookup)
+    small = view_mesh(subject, lookup, SMALL_HEAD_FACES)
+    limits = sigma_range_mm(after)
+    radius = after.points.radius_mm
+    factor = exaggeration(after, radius)
+    sample = spread_sample(after.points.points_mm, SHOWN)
+    drawn_before = ellipsoids(before, sample, factor, LARGEST_SHARE * radius)
+    drawn_after = ellipsoids(after, sample, factor, LARGEST_SHARE * radius)
+    plots = {
+        "rig-3d": rig_figure(design, mesh, layout, limits),
+        **error_maps(subject, before, after),
+        "ellipsoids-before": ellipsoid_figure(small, before, drawn_before, limits),
+        "ellipsoids-after": ellipsoid_figure(small, after, drawn_after, limits),
+    }
+    return _Figures(plots, drawn_before, drawn_after, factor, len(mesh.faces))
+
+
+def _figures_json(plots: dict[str, go.Figure]) -> str:
+    """The figures as JSON that may stand inside a script element, whatever names they hold."""
+    parts = []
+    for key, plot in plots.items():
+        # The default template would double the figures with styles the page overrides.
+        plot.update_layout(template="none")
+        parts.append(f"{json.dumps(key)}:{plot.to_json()}")
+    text = "{" + ",".join(parts) + "}"
+    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")

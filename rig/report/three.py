@@ -1,0 +1,78 @@
+"""Pieces of the three-dimensional figures."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from geometry.arrays import Floats, Ints
+
+if TYPE_CHECKING:
+    import plotly.graph_objects as go
+
+SOFT = {"ambient": 0.55, "diffuse": 0.75, "specular": 0.05, "roughness": 0.9, "fresnel": 0.05}
+LAMP = {"x": -4000, "y": -12000, "z": 9000}
+"""Above the left shoulder of a viewer behind the cameras."""
+
+
+def mesh_trace(
+    vertices_mm: Floats, faces: Ints, colour: str, name: str, **more: object
+) -> go.Mesh3d:
+    """A mesh (V, 3), (F, 3) in one colour; numbers in single precision, the page gets smaller."""
+    import plotly.graph_objects as go
+
+    x, y, z = np.asarray(vertices_mm).T.astype(np.float32)
+    i, j, k = np.asarray(faces).T.astype(np.uint16 if len(vertices_mm) < 65_536 else np.uint32)
+    options = {"color": colour, "lighting": SOFT, "lightposition": LAMP, "name": name} | more
+    return go.Mesh3d(x=x, y=y, z=z, i=i, j=j, k=k, **options)
+
+
+def lines_trace(
+    segments: Floats,
+    colour: str,
+    name: str,
+    *,
+    width: float = 3.0,
+    dotted: bool = False,
+    **more: object,
+) -> go.Scatter3d:
+    """Line segments (S, 2, 3) as one trace."""
+    import plotly.graph_objects as go
+
+    gaps = np.full((len(segments), 1, 3), np.nan)
+    x, y, z = np.concatenate([segments, gaps], axis=1).reshape(-1, 3).T.astype(np.float32)
+    line = {"color": colour, "width": width} | ({"dash": "dot"} if dotted else {})
+    return go.Scatter3d(x=x, y=y, z=z, mode="lines", line=line, name=name, hoverinfo="skip", **more)
+
+
+def scene_layout(
+    zoom: float, *, axes: bool = True, eye: tuple[float, float, float] = (-0.9, -1.45, 0.45)
+) -> dict[str, Any]:
+    """A scene in true proportion, seen from the cameras' side."""
+    axis = {
+        "showbackground": False,
+        "gridcolor": "#c9ced8",
+        "zeroline": False,
+        "showspikes": False,
+        "nticks": 6,
+        "visible": axes,
+    }
+    look = np.array(eye) / zoom
+    return {
+        "scene": {
+            "aspectmode": "data",
+            "xaxis": {**axis, "title": {"text": "X (mm)"}},
+            "yaxis": {**axis, "title": {"text": "Y (mm)"}},
+            "zaxis": {**axis, "title": {"text": "Z (mm)"}},
+            "camera": {
+                "eye": dict(zip("xyz", look.tolist(), strict=True)),
+                "center": {"x": 0, "y": 0, "z": -0.08},
+                "up": {"x": 0, "y": 0, "z": 1},
+                "projection": {"type": "perspective"},
+            },
+            "dragmode": "orbit",
+        },
+        "margin": {"l": 0, "r": 0, "t": 0, "b": 0},
+        "uirevision": "keep",
+    }

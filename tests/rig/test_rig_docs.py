@@ -1,0 +1,74 @@
+"""The documents and schemas say what the code does."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from pathlib import Path
+
+import jsonschema
+import pytest
+
+from rig.designfile import design_document
+from rig.designmodel import DesignFile
+from rig.examples import example_rig, example_text
+from rig.rigfile import RigFile, parse_rig
+from rig.schemas import documents, keys, main
+from solver.result import Design
+
+
+def test_generated_documents_are_up_to_date(repo: Path) -> None:
+    for path, text in documents(repo / "docs").items():
+        assert path.read_text(encoding="utf-8") == text, f"run: python -m rig.schemas ({path.name})"
+
+
+def test_the_command_writes_them(repo: Path, tmp_path: Path) -> None:
+    for name in ("rig-file.md", "design-file.md"):
+        text = (repo / "docs" / name).read_text(encoding="utf-8")
+        (tmp_path / name).write_text(text.replace("| `seed` |", "| `sead` |"), encoding="utf-8")
+    main(tmp_path)
+    for name in ("rig-file.md", "design-file.md", "rig.schema.json", "design.schema.json"):
+        assert (tmp_path / name).read_text() == (repo / "docs" / name).read_text()
+
+
+@pytest.mark.parametrize(
+    ("document", "model"), [("rig-file.md", RigFile), ("design-file.md", DesignFile)]
+)
+def test_every_key_is_documented(repo: Path, document: str, model: type) -> None:
+    text = (repo / "docs" / document).read_text(encoding="utf-8")
+    told = list(keys(model))
+    assert len(told) > 60
+    for key, _, words in told:
+        assert f"| `{key}` |" in text
+        assert words.endswith("."), f"{key} has no sentence"
+
+
+def test_examples_follow_the_rig_schema(repo: Path) -> None:
+    schema = json.loads((repo / "docs/rig.schema.json").read_text())
+    jsonschema.Draft202012Validator.check_schema(schema)
+    for name in ("face", "wall"):
+        data = tomllib.loads((repo / f"examples/{name}/rig.toml").read_text())
+        jsonschema.validate(data, schema)
+    with pytest.raises(jsonschema.ValidationError, match="base_hieght"):
+        jsonschema.validate({**data, "limits": {"base_hieght": {}}}, schema)
+
+
+def test_what_is_written_follows_the_design_schema(repo: Path, design: Design) -> None:
+    schema = json.loads((repo / "docs/design.schema.json").read_text())
+    jsonschema.Draft202012Validator.check_schema(schema)
+    document = json.loads(
+        json.dumps(design_document(design, spec=example_rig("face")), allow_nan=False)
+    )
+    jsonschema.validate(document, schema)
+
+
+def test_the_rig_file_in_the_document_is_a_rig_file(repo: Path) -> None:
+    text = (repo / "docs/rig-file.md").read_text(encoding="utf-8")
+    first = text.split("```toml\n")[1].split("```")[0]
+    assert parse_rig(first).count == 7
+    zones = text.split("```toml\n")[2].split("```")[0]
+    # The zones of the document, put into the example in place of its own.
+    before, _, after = example_text("face").partition("[limits.zones]")
+    rest = after.partition("[limits.motion]")[2]
+    read = parse_rig(f"{before}{zones}\n[limits.motion]{rest}").limits.zones
+    assert (len(read.forbidden), len(read.allowed)) == (1, 1)
