@@ -46,6 +46,7 @@ HTTP_ERRORS: Mapping[int, tuple[str, str, str]] = {
     400: ("input", "bad-request", "send a request as the documentation describes it"),
     404: ("not-found", "path", "see GET /v1 for what there is"),
     405: ("input", "method-not-allowed", "use a method that the Allow header names"),
+    413: ("too-large", "body", "send less, a design without its points for example"),
     415: ("input", "media-type", "send the media type that the documentation names"),
 }
 """Kind, detail and remedy of the errors that the web framework raises by itself."""

@@ -13,7 +13,7 @@ from fastapi.openapi.utils import get_openapi
 from service.api import designs, evaluations, root, scans
 from service.api.context import Service
 from service.api.errors import install_error_handlers
-from service.api.middleware import RequestLog
+from service.api.middleware import JsonLimit, RequestLog
 from service.api.models import Problem
 
 _DESCRIPTION = (
@@ -27,9 +27,11 @@ def make_app() -> FastAPI:
     app = FastAPI(
         title="Rigwright", version="1", description=_DESCRIPTION, lifespan=_lifespan, redoc_url=None
     )
-    for module in (root, scans, designs, evaluations):
-        app.include_router(module.router)
+    app.state.routers = [module.router for module in (root, scans, designs, evaluations)]
+    for router in app.state.routers:
+        app.include_router(router)
     install_error_handlers(app)
+    app.add_middleware(JsonLimit)
     app.add_middleware(RequestLog)
     app.openapi = lambda: _openapi(app)  # type: ignore[method-assign]
     return app

@@ -12,7 +12,7 @@ from service.api.context import ServiceDep
 from service.api.job_routes import JobResource
 from service.api.models import IdempotencyKeyHeader, Job, Model, problems
 from service.api.results import DesignResult
-from service.api.submission import LARGEST_JSON_BYTES, rig_for_scan, submit
+from service.api.submission import rig_for_scan, submit
 
 router = APIRouter(tags=["designs"])
 
@@ -45,7 +45,6 @@ resource = JobResource("design", "designs", DesignJob, DesignPage)
     status_code=201,
     response_model=DesignJob,
     responses=problems(400, 404, 409, 413, 422, 503, 507),
-    max_body_size=LARGEST_JSON_BYTES,
 )
 def add_design(
     request: DesignRequest,

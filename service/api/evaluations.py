@@ -14,7 +14,7 @@ from service.api.context import ServiceDep
 from service.api.job_routes import JobResource
 from service.api.models import IdempotencyKeyHeader, Job, Model, problems
 from service.api.results import EvaluationResult
-from service.api.submission import LARGEST_JSON_BYTES, rig_for_scan, submit
+from service.api.submission import rig_for_scan, submit
 
 router = APIRouter(tags=["evaluations"])
 
@@ -49,7 +49,6 @@ resource = JobResource("evaluation", "evaluations", EvaluationJob, EvaluationPag
     status_code=201,
     response_model=EvaluationJob,
     responses=problems(400, 404, 409, 413, 422, 503, 507),
-    max_body_size=LARGEST_JSON_BYTES,
 )
 def add_evaluation(
     request: EvaluationRequest,

@@ -15,10 +15,6 @@ from service.store.idempotency import IdempotencyKey
 from service.store.jobs import NewJob
 from service.store.scans import ScanRecord
 
-LARGEST_JSON_BYTES = 64 << 20
-"""A design document with its thousands of points has a few megabytes."""
-
-
 def rig_for_scan(rig: RigFile, scan: ScanRecord, overrides: dict[str, Any]) -> dict[str, Any]:
     """The rig as JSON, with ``overrides``, and read with the scan's own options where it has none.
 

@@ -14,12 +14,12 @@ from sqlalchemy import Connection, insert, select
 from geometry.errors import InputError, InternalError
 from service.wire import error_fields
 from service.store import idempotency
-from service.store.blobs import Blobs
+from service.store.blobs import Blobs, known_files
 from service.store.database import Database
 from service.store.jobs import Jobs
 from service.store.lock import FolderLock
 from service.store.scans import Scans
-from service.store.tables import blobs, identity, utc_now
+from service.store.tables import identity, utc_now
 
 
 def interrupted() -> InternalError:
@@ -79,8 +79,7 @@ class Store:
         shutil.rmtree(self._work, ignore_errors=True)
         self.database.write(idempotency.forget_stale)
         self.jobs.interrupt_running(error_fields(interrupted()))
-        known = self.database.read(lambda connection: set(connection.scalars(select(blobs.c.sha256))))
-        self.files.sweep(known)
+        self.files.sweep(self.database.read(known_files))
 
 
 def _migrate(connection: Connection) -> None:

@@ -132,6 +132,11 @@ class Blobs:
         return self._root.glob("??/??/*")
 
 
+def known_files(connection: Connection) -> set[str]:
+    """The hashes of all files that have a row."""
+    return set(connection.scalars(select(blobs.c.sha256)))
+
+
 def _sync_folder(folder: Path) -> None:
     # Without this the new name, unlike the content, may be lost with the power.
     handle = os.open(folder, os.O_RDONLY)

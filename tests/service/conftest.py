@@ -7,12 +7,19 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+import trimesh
+from starlette.testclient import TestClient
 
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE))
 
-from service_helpers import ROOT, LiveServer, StartServer  # noqa: E402 - found by the line above
+import counting_job  # noqa: E402 - found by the line above, like the next two
+import live_server  # noqa: E402
+from service_helpers import ROOT, LiveServer, StartServer  # noqa: E402
 
+from service.api.context import Service  # noqa: E402
+from service.kinds import KINDS  # noqa: E402
+from service.settings import read_settings  # noqa: E402
 from service.store import Store  # noqa: E402
 
 
@@ -49,7 +56,10 @@ def start_server(tmp_path: Path) -> Iterator[StartServer]:
         assert process.stdout is not None
         url = process.stdout.readline().strip()
         log.close()
-        assert url, Path(log.name).read_text()
+        if not url:
+            process.wait(20.0)
+            process.stdout.close()
+            raise AssertionError(Path(log.name).read_text())
         server = LiveServer(process, url, Path(log.name))
         started.append(server)
         return server
@@ -59,3 +69,28 @@ def start_server(tmp_path: Path) -> Iterator[StartServer]:
         server.kill()
         assert server.process.stdout is not None
         server.process.stdout.close()
+
+
+@pytest.fixture(scope="session")
+def head_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An egg of a head's size in millimetres, Z up: enough to be read."""
+    egg = trimesh.creation.icosphere(subdivisions=4)
+    egg.apply_scale([75.0, 95.0, 110.0])
+    path = tmp_path_factory.mktemp("scan") / "egg.ply"
+    egg.export(path)
+    return path
+
+
+@pytest.fixture
+def service(tmp_path: Path) -> Iterator[Service]:
+    settings = read_settings(data_dir=tmp_path / "data", max_upload_bytes=2 << 20, workers_per_job=1)
+    opened = Service(settings, {**KINDS, **counting_job.KINDS})
+    yield opened
+    opened.close()
+
+
+@pytest.fixture
+def client(service: Service) -> Iterator[TestClient]:
+    """The application with its jobs running; errors are answered as a server would."""
+    with TestClient(live_server.make(service), raise_server_exceptions=False) as opened:
+        yield opened
