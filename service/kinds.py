@@ -7,7 +7,7 @@ from service.jobs.engine import JobKind
 KINDS = {
     kind.name: kind
     for kind in (
-        JobKind("design", "service.work:design_job"),
-        JobKind("evaluation", "service.work:evaluation_job"),
+        JobKind("design", "service.tasks.designing:design"),
+        JobKind("evaluation", "service.tasks.designing:evaluation"),
     )
 }

@@ -20,7 +20,9 @@ _GRACE_S = 5
 class _Server(uvicorn.Server):
     """Ends event streams before it waits for connections to close: they would never close."""
 
-    def __init__(self, config: uvicorn.Config, service: Service, ready: Callable[[str], None]) -> None:
+    def __init__(
+        self, config: uvicorn.Config, service: Service, ready: Callable[[str], None]
+    ) -> None:
         super().__init__(config)
         self._service = service
         self._ready = ready

@@ -25,14 +25,18 @@ class Settings(BaseSettings):
 
     model_config = SettingsConfigDict(env_prefix=PREFIX, extra="forbid", frozen=True)
 
-    host: Annotated[str, Field(description="Address to listen on; 127.0.0.1 is this machine only.")] = (
-        "127.0.0.1"
+    host: Annotated[
+        str, Field(description="Address to listen on; 127.0.0.1 is this machine only.")
+    ] = "127.0.0.1"
+    port: Annotated[
+        int, Field(ge=0, le=65535, description="Port to listen on; 0 takes a free one.")
+    ] = 8000
+    data_dir: Annotated[Path, Field(description="Folder for everything the service keeps.")] = (
+        Field(default_factory=default_data_folder)
     )
-    port: Annotated[int, Field(ge=0, le=65535, description="Port to listen on; 0 takes a free one.")] = 8000
-    data_dir: Annotated[Path, Field(description="Folder for everything the service keeps.")] = Field(
-        default_factory=default_data_folder
+    max_upload_bytes: Annotated[int, Field(ge=1, description="Largest scan that is accepted.")] = (
+        512 << 20
     )
-    max_upload_bytes: Annotated[int, Field(ge=1, description="Largest scan that is accepted.")] = 512 << 20
     jobs_at_once: Annotated[int, Field(ge=1, le=64, description="Jobs that run side by side.")] = 1
     workers_per_job: Annotated[
         int, Field(ge=1, le=1024, description="Processes that one design may use.")
@@ -61,11 +65,17 @@ def read_settings(**given: object) -> Settings:
     )
     if unknown:
         raise InputError(
-            "settings", f"there is no setting {unknown[0]}", f"the settings are {', '.join(sorted(known))}"
+            "settings",
+            f"there is no setting {unknown[0]}",
+            f"the settings are {', '.join(sorted(known))}",
         )
     try:
-        return Settings.model_validate({name: value for name, value in given.items() if value is not None})
+        return Settings.model_validate(
+            {name: value for name, value in given.items() if value is not None}
+        )
     except ValidationError as error:
         first = error.errors()[0]
         name = PREFIX + str(first["loc"][0]).upper()
-        raise InputError("settings", f"{name} is {first['input']!r}", first["msg"].lower()) from error
+        raise InputError(
+            "settings", f"{name} is {first['input']!r}", first["msg"].lower()
+        ) from error

@@ -1,25 +1,23 @@
 """The work itself: the one place where the service meets geometry, solver and rig.
 
-Everything here runs where it may take its time: in the process of a job or of a command.
+Everything here runs in the process of a task, where it may take its time.
 """
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+import trimesh
 
 from geometry.camera import RigCamera
 from geometry.preparation import PreparedSubject, prepare_subject
 from geometry.reading import read_scan
 from geometry.scan import Scan
-from rig.designfile import design_from_mapping, evaluation_document
+from rig.designfile import evaluation_document
 from rig.files import write_design_folder
 from rig.layout import Layout, make_layout
-from rig.rigfile import RigFile
-from rig.sections.subject import ScanSection
 from rig.spec import RigSpec
 from service.wire import plain
 from solver.design import design
@@ -42,57 +40,6 @@ class DesignOutcome:
     summary: JSON
 
 
-def import_scan(
-    request: Mapping[str, Any],
-    inputs: Mapping[str, Path],
-    folder: Path,
-    report: ProgressCallback,
-    cancel: CancelToken,
-) -> JSON:
-    """Job: read an uploaded scan and tell what was found in it."""
-    del folder, report, cancel
-    options = ScanSection.model_validate(request["options"]).to_options()
-    return scan_report(read_scan(inputs["scan"], options))
-
-
-def design_job(
-    request: Mapping[str, Any],
-    inputs: Mapping[str, Path],
-    folder: Path,
-    report: ProgressCallback,
-    cancel: CancelToken,
-) -> JSON:
-    """Job: design a rig and write its files into ``folder``."""
-    spec = RigFile.model_validate(request["rig"]).to_spec()
-    outcome = run_design(
-        inputs["scan"],
-        spec,
-        folder,
-        scan_name=request["scan_name"],
-        workers=request["workers"],
-        progress=report,
-        cancel=cancel,
-    )
-    return outcome.summary
-
-
-def evaluation_job(
-    request: Mapping[str, Any],
-    inputs: Mapping[str, Path],
-    folder: Path,
-    report: ProgressCallback,
-    cancel: CancelToken,
-) -> JSON:
-    """Job: score given cameras and write ``evaluation.json`` into ``folder``."""
-    del cancel
-    spec = RigFile.model_validate(request["rig"]).to_spec()
-    cameras = design_from_mapping(request["design"], "design", spec.camera).cameras
-    report(Progress("reading the scan", 0.0))
-    quality, document = run_evaluation(inputs["scan"], spec, cameras)
-    (folder / "evaluation.json").write_text(json.dumps(document), encoding="utf-8")
-    return quality_summary(quality, len(cameras))
-
-
 def run_design(
     scan_path: Path,
     spec: RigSpec,
@@ -110,7 +57,9 @@ def run_design(
     def within(inner: Progress, /) -> None:
         fraction = _READING + (_DESIGNING - _READING) * inner.fraction
         progress(
-            Progress(inner.stage, fraction, inner.start, inner.iteration, inner.cost, inner.violation)
+            Progress(
+                inner.stage, fraction, inner.start, inner.iteration, inner.cost, inner.violation
+            )
         )
 
     made = design(
@@ -135,21 +84,18 @@ def run_design(
 
 def run_evaluation(
     scan_path: Path, spec: RigSpec, cameras: tuple[RigCamera, ...]
-) -> tuple[Quality, JSON]:
-    """Score given cameras; the figures and their document."""
+) -> tuple[JSON, JSON]:
+    """Score given cameras: the figures in short, and their document."""
     prepared = prepare_subject(read_scan(scan_path, spec.scan_options), spec.subject_options)
     quality = evaluate(prepared.subject, cameras, spec.limits)
-    return quality, evaluation_document(cameras, quality)
+    return quality_summary(quality, len(cameras)), evaluation_document(cameras, quality)
 
 
-def scan_report(scan: Scan) -> JSON:
-    """What a scan holds and what was inferred or changed."""
-    return {
-        "vertices": len(scan.vertices_mm),
-        "faces": len(scan.faces),
-        "extents_mm": [round(float(extent), 3) for extent in scan.extents_mm],
-        "notes": [{"kind": note.kind, "text": note.text} for note in scan.notes],
-    }
+def write_scan(scan: Scan, path: Path) -> None:
+    """A scan as a mesh file, millimetres in the rig frame."""
+    trimesh.Trimesh(
+        scan.vertices_mm, scan.faces, vertex_normals=scan.normals, process=False
+    ).export(path)
 
 
 def quality_summary(quality: Quality, cameras: int) -> JSON:

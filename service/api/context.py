@@ -23,7 +23,9 @@ _IMPORTS_AT_ONCE = 2
 class Service:
     """The parts of a running service. Opening it opens the store."""
 
-    def __init__(self, settings: Settings, kinds: Mapping[str, JobKind], engine: Engine | None = None) -> None:
+    def __init__(
+        self, settings: Settings, kinds: Mapping[str, JobKind], engine: Engine | None = None
+    ) -> None:
         self.settings = settings
         self.store = Store(settings.data_dir)
         self.engine = engine or ProcessEngine(settings.cancel_grace_s)
@@ -51,7 +53,9 @@ def the_service(request: Request) -> Service:
     """The service that an application was made for."""
     service = getattr(request.app.state, "service", None)
     if not isinstance(service, Service):
-        raise InternalError("no-service", "the application has no service", "use service.api.app.create_app")
+        raise InternalError(
+            "no-service", "the application has no service", "use service.api.app.create_app"
+        )
     return service
 
 

@@ -10,7 +10,13 @@ from pydantic import Field
 from rig.rigfile import RigFile
 from service.api.context import ServiceDep
 from service.api.job_routes import JobResource
-from service.api.models import IdempotencyKeyHeader, Job, Model, problems
+from service.api.models import (
+    LARGEST_JSON_INTEGER,
+    IdempotencyKeyHeader,
+    Job,
+    Model,
+    problems,
+)
 from service.api.results import DesignResult
 from service.api.submission import rig_for_scan, submit
 
@@ -22,8 +28,10 @@ class DesignRequest(Model):
 
     scan_id: Annotated[str, Field(max_length=100)]
     rig: Annotated[RigFile, Field(description="The structure of a rig file, as JSON.")]
-    cameras: Annotated[int | None, Field(ge=1, le=500, description="How many cameras to place.")] = None
-    seed: Annotated[int | None, Field(ge=0, le=2**63 - 1)] = None
+    cameras: Annotated[
+        int | None, Field(ge=1, le=500, description="How many cameras to place.")
+    ] = None
+    seed: Annotated[int | None, Field(ge=0, le=LARGEST_JSON_INTEGER)] = None
 
 
 class DesignJob(Job[DesignResult]):

@@ -32,9 +32,14 @@ def install_error_handlers(app: FastAPI) -> None:
 def answer(error: RigwrightError, **more: object) -> JSONResponse:
     """The problem details of an error."""
     document = problem_document(error) | more
-    response = JSONResponse(document, status_code=int(str(document["status"])), media_type=MEDIA_TYPE)
+    response = JSONResponse(
+        document, status_code=int(str(document["status"])), media_type=MEDIA_TYPE
+    )
     if response.status_code == 503:
         response.headers["Retry-After"] = _RETRY_AFTER_S
+    if response.status_code == 413:
+        # The rest of the body is not read, so nothing else can come on this connection.
+        response.headers["Connection"] = "close"
     return response
 
 
@@ -56,12 +61,14 @@ def _invalid_request(_request: Request, error: Exception) -> JSONResponse:
     ]
     if any(fault["type"] == "json_invalid" for fault in found):
         return answer(
-            InputError("malformed-json", "the body is not JSON", "send a JSON object"), errors=faults
+            InputError("malformed-json", "the body is not JSON", "send a JSON object"),
+            errors=faults,
         )
     more = f" ({len(faults) - 1} more)" if len(faults) > 1 else ""
     problem = f"{faults[0]['location']}: {faults[0]['message']}{more}"
     return answer(
-        InputError("request-invalid", problem, "compare the request with GET /openapi.json"), errors=faults
+        InputError("request-invalid", problem, "compare the request with GET /openapi.json"),
+        errors=faults,
     )
 
 
@@ -105,12 +112,16 @@ def _system_error(request: Request, error: Exception) -> JSONResponse:
 
 def _disk_full() -> InternalError:
     return InternalError(
-        "disk-full", "the disk of the service is full", "remove designs or scans that are not needed"
+        "disk-full",
+        "the disk of the service is full",
+        "remove designs or scans that are not needed",
     )
 
 
 def _fault(_request: Request, error: Exception) -> JSONResponse:
     log.error("a request met a fault", exc_info=error)
     return answer(
-        InternalError("fault", "the service met a fault", "see the service's log for the request's id")
+        InternalError(
+            "fault", "the service met a fault", "see the service's log for the request's id"
+        )
     )

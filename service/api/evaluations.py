@@ -26,7 +26,9 @@ class EvaluationRequest(Model):
     rig: Annotated[RigFile, Field(description="The structure of a rig file, as JSON.")]
     design: Annotated[
         DesignFile,
-        Field(description="A design document; of an existing rig `schema` and `cameras` are enough."),
+        Field(
+            description="A design document; of an existing rig `schema` and `cameras` are enough."
+        ),
     ]
 
 
@@ -64,7 +66,9 @@ def add_evaluation(
         by_alias=True, exclude_unset=True, include={"schema_", "name", "cameras"}
     )
     design_from_mapping(design, "design", RigFile.model_validate(rig).to_spec().camera)
-    return submit(service, resource, {"rig": rig, "design": design}, scan, idempotency_key, response)
+    return submit(
+        service, resource, {"rig": rig, "design": design}, scan, idempotency_key, response
+    )
 
 
 resource.add_to(router)

@@ -26,7 +26,9 @@ class JobResource:
     ``shortcuts`` give files a path of their own: ``{"report": "report.html"}``.
     """
 
-    def __init__(self, kind: str, plural: str, model: type[BaseModel], page: type[BaseModel]) -> None:
+    def __init__(
+        self, kind: str, plural: str, model: type[BaseModel], page: type[BaseModel]
+    ) -> None:
         self.kind = kind
         self.path = f"/v1/{plural}"
         self._model = model
@@ -168,7 +170,11 @@ class JobResource:
 
 def _any_file(media_type: str) -> dict[int | str, dict[str, Any]]:
     schema = {"type": "string", "format": "binary"}
-    content = {"application/json": {}} if media_type == "application/json" else {media_type: {"schema": schema}}
+    content = (
+        {"application/json": {}}
+        if media_type == "application/json"
+        else {media_type: {"schema": schema}}
+    )
     return {200: {"description": "The file.", "content": content}}
 
 

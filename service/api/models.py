@@ -9,12 +9,13 @@ from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
 
 from service.store.tables import JobStatus
 
-_LARGEST_INTEGER = 2**63 - 1
+LARGEST_JSON_INTEGER = 2**53 - 1
+"""Beyond it JSON readers that use floating point, as browsers do, see another number."""
 
 Limit = Annotated[int, Query(ge=1, le=200, description="How many to list.")]
 Cursor = Annotated[
     int | None,
-    Query(ge=1, le=_LARGEST_INTEGER, description="Where to go on: `next` of the page before."),
+    Query(ge=1, le=LARGEST_JSON_INTEGER, description="Where to go on: `next` of the page before."),
 ]
 IdempotencyKeyHeader = Annotated[
     str | None,
@@ -32,7 +33,7 @@ LastEventIdHeader = Annotated[
     Header(
         alias="Last-Event-ID",
         ge=0,
-        le=_LARGEST_INTEGER,
+        le=LARGEST_JSON_INTEGER,
         description="The last event you have seen; the stream goes on after it.",
     ),
 ]

@@ -7,10 +7,10 @@ from typing import Literal
 
 from fastapi import APIRouter
 
+from rig.designfile import program_version
 from service.api.context import ServiceDep
 from service.api.models import Model
 from service.store.tables import JobStatus
-from rig.designfile import program_version
 
 router = APIRouter(tags=["service"])
 

@@ -33,11 +33,14 @@ class Scan(Model):
     size_bytes: int
     created_at: AwareDatetime
     options: Annotated[
-        dict[str, str | float], Field(description="How to read it, as given; a rig file may override.")
+        dict[str, str | float],
+        Field(description="How to read it, as given; a rig file may override."),
     ]
     vertices: int
     faces: Annotated[int, Field(description="0 for a point cloud.")]
-    extents_mm: Annotated[list[float], Field(description="Width, depth and height in the rig frame.")]
+    extents_mm: Annotated[
+        list[float], Field(description="Width, depth and height in the rig frame.")
+    ]
     notes: list[Note]
     links: dict[str, str]
 
@@ -79,8 +82,8 @@ _BODY = {
     "/v1/scans",
     status_code=201,
     response_model=Scan,
-    responses={200: {"model": Scan, "description": "The scan was here already."}}
-    | problems(409, 413, 415, 422, 503, 507),
+    responses=problems(409, 413, 415, 422, 503, 507)
+    | {200: {"model": Scan, "description": "The scan was here already."}},
     openapi_extra=_BODY,
 )
 async def add_scan(

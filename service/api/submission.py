@@ -15,6 +15,7 @@ from service.store.idempotency import IdempotencyKey
 from service.store.jobs import NewJob
 from service.store.scans import ScanRecord
 
+
 def rig_for_scan(rig: RigFile, scan: ScanRecord, overrides: dict[str, Any]) -> dict[str, Any]:
     """The rig as JSON, with ``overrides``, and read with the scan's own options where it has none.
 

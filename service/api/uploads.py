@@ -166,7 +166,7 @@ def _read(service: Service, staged: StagedFile, upload: Upload) -> dict[str, Any
     settings = service.settings
     kind = JobKind(
         "scan-import",
-        "service.work:import_scan",
+        "service.tasks.reading:import_scan",
         time_limit_s=settings.scan_time_limit_s,
         memory_limit_bytes=settings.scan_memory_limit_bytes,
     )
@@ -175,7 +175,9 @@ def _read(service: Service, staged: StagedFile, upload: Upload) -> dict[str, Any
     try:
         return service.engine.run(task, lambda _: None, service.stopping)
     except CancelledError:
-        raise InternalError("stopping", "the service is stopping", "send the scan again later") from None
+        raise InternalError(
+            "stopping", "the service is stopping", "send the scan again later"
+        ) from None
     except InternalError as error:
         if error.detail != "worker-died":
             raise

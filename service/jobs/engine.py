@@ -17,11 +17,12 @@ from solver.progress import CancelToken
 
 @dataclass(frozen=True)
 class JobKind:
-    """A kind of work. ``entry`` is ``module:function``, called in the process of the task as
-    ``function(request, inputs, folder, progress, cancel) -> result``.
+    """A kind of work.
 
-    What the function writes into ``folder`` is kept as the job's files. ``time_limit_s`` and
-    ``memory_limit_bytes`` (address space) end work that takes too much; None: no limit.
+    ``entry`` is ``module:function``, called in the process of the task as
+    ``function(request, inputs, folder, report, cancel) -> result``. What the function writes
+    into ``folder`` is kept as the job's files. ``time_limit_s`` and ``memory_limit_bytes``
+    (address space) end work that takes too much; None: no limit.
     """
 
     name: str

@@ -21,10 +21,10 @@ from geometry.errors import CancelledError, InternalError, RigwrightError
 from service import logs
 from service.jobs.bell import Bell
 from service.jobs.engine import Engine, JobKind, Task
-from service.wire import error_fields
 from service.store import Store, interrupted
 from service.store.jobs import JobRecord
 from service.store.tables import JobStatus
+from service.wire import error_fields
 
 _RETRY_S = 1.0
 
@@ -131,7 +131,9 @@ class JobManager:
     def _work(self, job: JobRecord, folder: Path, cancel: threading.Event) -> dict[str, Any]:
         if job.kind not in self._kinds:
             raise InternalError(
-                "job-kind", f"this version cannot do {job.kind!r} jobs", "use the version that made the job"
+                "job-kind",
+                f"this version cannot do {job.kind!r} jobs",
+                "use the version that made the job",
             )
         (folder / "files").mkdir()
 

@@ -16,20 +16,17 @@ from typing import IO, Any
 
 from geometry.errors import CancelledError, InternalError, RigwrightError, TooLargeError
 from service.jobs.engine import Report, Task
-from service.wire import error_from_fields, line
 from service.logs import log
+from service.wire import error_from_fields, line
 from solver.progress import CancelToken
 
 _POLL_S = 0.05
 _ONE_THREAD = {
-    name: "1"
-    for name in (
-        "OMP_NUM_THREADS",
-        "OPENBLAS_NUM_THREADS",
-        "MKL_NUM_THREADS",
-        "VECLIB_MAXIMUM_THREADS",
-        "NUMEXPR_NUM_THREADS",
-    )
+    "OMP_NUM_THREADS": "1",
+    "OPENBLAS_NUM_THREADS": "1",
+    "MKL_NUM_THREADS": "1",
+    "VECLIB_MAXIMUM_THREADS": "1",
+    "NUMEXPR_NUM_THREADS": "1",
 }
 
 
@@ -85,7 +82,9 @@ class ProcessEngine:
         if kill_at_s is not None:
             return CancelledError()
         return InternalError(
-            "worker-died", "the process that did the work died", "see the service's log, then try again"
+            "worker-died",
+            "the process that did the work died",
+            "see the service's log, then try again",
         )
 
 

@@ -12,7 +12,6 @@ from alembic.config import Config
 from sqlalchemy import Connection, insert, select
 
 from geometry.errors import InputError, InternalError
-from service.wire import error_fields
 from service.store import idempotency
 from service.store.blobs import Blobs, known_files
 from service.store.database import Database
@@ -20,6 +19,7 @@ from service.store.jobs import Jobs
 from service.store.lock import FolderLock
 from service.store.scans import Scans
 from service.store.tables import identity, utc_now
+from service.wire import error_fields
 
 
 def interrupted() -> InternalError:
@@ -90,7 +90,7 @@ def _migrate(connection: Connection) -> None:
 
 
 def _identify(connection: Connection) -> str:
-    found = connection.scalar(select(identity.c.service_uuid))
+    found: str | None = connection.scalar(select(identity.c.service_uuid))
     if found is not None:
         return found
     created = str(uuid.uuid4())

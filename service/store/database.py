@@ -49,7 +49,9 @@ def _engine(path: Path, *, begin: str, query_only: bool) -> Engine:
 class _Change:
     """One change on its way to the writer thread and its outcome on the way back."""
 
-    def __init__(self, change: Callable[[Connection], Any], after: Callable[[], None] | None) -> None:
+    def __init__(
+        self, change: Callable[[Connection], Any], after: Callable[[], None] | None
+    ) -> None:
         self.change = change
         self.after = after
         self.outcome: Future[Any] = Future()
@@ -71,7 +73,9 @@ class Database:
         with self._reading.connect() as connection, connection.begin():
             return query(connection)
 
-    def write(self, change: Callable[[Connection], T], after: Callable[[], None] | None = None) -> T:
+    def write(
+        self, change: Callable[[Connection], T], after: Callable[[], None] | None = None
+    ) -> T:
         """Run ``change`` in one transaction on the writer thread and wait until it is durable.
 
         An exception in ``change`` undoes the transaction and is raised here. ``after`` runs on

@@ -203,7 +203,9 @@ class Jobs:
 
         self._database.write(change)
 
-    def complete(self, job_id: str, result: JSON, files: Mapping[str, tuple[StagedFile, str]]) -> None:
+    def complete(
+        self, job_id: str, result: JSON, files: Mapping[str, tuple[StagedFile, str]]
+    ) -> None:
         """The job's result and files (name: file, media type) become durable in one step."""
 
         def change(connection: Connection) -> None:
@@ -236,7 +238,9 @@ class Jobs:
             job = _one(connection, job_id, kind)
             if job.status.terminal:
                 raise ConflictError(
-                    "job-ended", f"the job has already ended ({job.status})", "there is nothing to cancel"
+                    "job-ended",
+                    f"the job has already ended ({job.status})",
+                    "there is nothing to cancel",
                 )
             connection.execute(
                 update(jobs).where(jobs.c.id == job_id).values(cancel_requested=True)
@@ -271,7 +275,9 @@ class Jobs:
             left = connection.scalars(select(jobs.c.id).where(jobs.c.status == JobStatus.RUNNING))
             ids = list(left)
             for job_id in ids:
-                _end(connection, job_id, JobStatus.INTERRUPTED, {"problem": problem}, problem=problem)
+                _end(
+                    connection, job_id, JobStatus.INTERRUPTED, {"problem": problem}, problem=problem
+                )
             return ids
 
         return self._database.write(change)
@@ -281,7 +287,9 @@ def _one(connection: Connection, job_id: str, kind: str | None = None) -> JobRec
     row = connection.execute(select(jobs).where(jobs.c.id == job_id)).mappings().one_or_none()
     if row is None or kind not in (None, row["kind"]):
         what = kind or "job"
-        raise NotFoundError(what, f"there is no {what} {job_id!r}", f"list the {what}s to see which exist")
+        raise NotFoundError(
+            what, f"there is no {what} {job_id!r}", f"list the {what}s to see which exist"
+        )
     return _record(row)
 
 

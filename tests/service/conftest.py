@@ -47,7 +47,13 @@ def start_server(tmp_path: Path) -> Iterator[StartServer]:
         log = (tmp_path / f"server-{len(started)}.log").open("w")
         environment = {f"RIGWRIGHT_{name.upper()}": str(value) for name, value in settings.items()}
         process = subprocess.Popen(
-            [sys.executable, "-W", "error", str(HERE / "live_server.py"), str(data or tmp_path / "data")],
+            [
+                sys.executable,
+                "-W",
+                "error",
+                str(HERE / "live_server.py"),
+                str(data or tmp_path / "data"),
+            ],
             stdout=subprocess.PIPE,
             stderr=log,
             text=True,
@@ -83,7 +89,9 @@ def head_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def service(tmp_path: Path) -> Iterator[Service]:
-    settings = read_settings(data_dir=tmp_path / "data", max_upload_bytes=2 << 20, workers_per_job=1)
+    settings = read_settings(
+        data_dir=tmp_path / "data", max_upload_bytes=2 << 20, workers_per_job=1
+    )
     opened = Service(settings, {**KINDS, **counting_job.KINDS})
     yield opened
     opened.close()

@@ -29,10 +29,16 @@ Report = Callable[[Progress], None]
 
 
 def count(
-    request: Mapping[str, Any], inputs: Mapping[str, Path], folder: Path, report: Report, cancel: CancelToken
+    request: Mapping[str, Any],
+    inputs: Mapping[str, Path],
+    folder: Path,
+    report: Report,
+    cancel: CancelToken,
 ) -> dict[str, Any]:
     """Counts to ``to``, a step each ``step_s``; writes what it counted."""
     to, step_s = int(request["to"]), float(request.get("step_s", 0.01))
+    if to < 0:
+        raise InputError("value", f"cannot count to {to}", "give zero or more")
     for n in range(to):
         if cancel.is_set() and not request.get("deaf"):
             raise CancelledError
@@ -44,7 +50,11 @@ def count(
 
 
 def misbehave(
-    request: Mapping[str, Any], inputs: Mapping[str, Path], folder: Path, report: Report, cancel: CancelToken
+    request: Mapping[str, Any],
+    inputs: Mapping[str, Path],
+    folder: Path,
+    report: Report,
+    cancel: CancelToken,
 ) -> dict[str, Any]:
     """Fails in the way it is asked to."""
     del inputs, folder, report, cancel
@@ -60,10 +70,12 @@ def misbehave(
     if how == "eat":
         return {"eaten": len(bytearray(8 << 30))}
     if how == "print":
-        print("a banner", flush=True)
+        print("a banner", flush=True)  # noqa: T201 - as some libraries do
         subprocess.run(["echo", "another"], check=True)
     if how == "spawn":
-        subprocess.Popen([sys.executable, "-c", f"import time; time.sleep(600) # {request['mark']}"])
+        subprocess.Popen(
+            [sys.executable, "-c", f"import time; time.sleep(600) # {request['mark']}"]
+        )
     if how == "threads":
         import numpy  # noqa: F401
         from threadpoolctl import threadpool_info

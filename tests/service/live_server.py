@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import counting_job
-from fastapi import APIRouter, Response
+from fastapi import APIRouter, FastAPI, Response
 
 from service.api.app import create_app
 from service.api.context import Service, ServiceDep
@@ -59,17 +59,22 @@ def add_count(
 resource.add_to(router)
 
 
-def make(service: Service) -> Any:
+def make(service: Service) -> FastAPI:
     app = create_app(service)
     app.include_router(router)
     return app
+
+
+def say(url: str) -> None:
+    sys.stdout.write(url + "\n")
+    sys.stdout.flush()
 
 
 def main() -> None:
     set_up_logging()
     settings = read_settings(port=0, data_dir=Path(sys.argv[1]))
     service = Service(settings, {**KINDS, **counting_job.KINDS})
-    serve(service, make(service), lambda url: print(url, flush=True))
+    serve(service, make(service), say)
     service.close()
 
 

@@ -8,18 +8,19 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TypeVar
 
 import httpx2
 
 from service.store import Store
 from service.store.jobs import JobRecord
 
+T = TypeVar("T")
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
 
 
-def wait_for(condition: Callable[[], Any], seconds: float = 30.0) -> Any:
+def wait_for(condition: Callable[[], T | None], seconds: float = 30.0) -> T:
     """The first true value of ``condition``; fails when there is none in time."""
     end = time.monotonic() + seconds
     while time.monotonic() < end:
@@ -37,8 +38,7 @@ def ended(store: Store, job_id: str, seconds: float = 30.0) -> JobRecord:
         job = store.jobs.get(job_id)
         return job if job.status.terminal else None
 
-    found: JobRecord = wait_for(look, seconds)
-    return found
+    return wait_for(look, seconds)
 
 
 def alive(mark: str) -> list[int]:

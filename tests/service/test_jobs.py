@@ -20,12 +20,14 @@ from service.jobs.process import ProcessEngine
 from service.store import Store
 from service.store.jobs import NewJob
 from service.store.tables import JobStatus
-from solver.progress import NeverCancelled
+from solver.progress import CancelToken, NeverCancelled
 
 ENGINE = ProcessEngine(cancel_grace_s=0.5)
 
 
-def run(tmp_path: Path, kind: str, request: dict[str, Any], cancel: Any = None) -> dict[str, Any]:
+def run(
+    tmp_path: Path, kind: str, request: dict[str, Any], cancel: CancelToken | None = None
+) -> dict[str, Any]:
     folder = tmp_path / "files"
     folder.mkdir(exist_ok=True)
     task = Task(counting_job.KINDS[kind], request, folder)
@@ -53,7 +55,8 @@ class TestProcessEngine:
         assert caught.value.detail == "value"
 
     @pytest.mark.parametrize(
-        ("how", "detail"), [("raise", "job-crashed"), ("segfault", "worker-died"), ("die", "worker-died")]
+        ("how", "detail"),
+        [("raise", "job-crashed"), ("segfault", "worker-died"), ("die", "worker-died")],
     )
     def test_a_crash_is_an_internal_error(self, tmp_path: Path, how: str, detail: str) -> None:
         with pytest.raises(InternalError) as caught:
@@ -102,15 +105,16 @@ class TestProcessEngine:
     def test_nothing_outlives_the_process_that_started_it(self, tmp_path: Path) -> None:
         mark = f"orphan-{tmp_path.name}"
         script = (
-            "import sys; sys.path[:0] = [{root!r}, {here!r}]\n"
+            f"import sys; sys.path[:0] = [{str(ROOT)!r}, {str(HERE)!r}]\n"
             "import counting_job\n"
             "from pathlib import Path\n"
             "from service.jobs.engine import Task\n"
             "from service.jobs.process import ProcessEngine\n"
-            "from solver.progress import NeverCancelled\n"
-            "task = Task(counting_job.COUNT, {{'to': 100000, 'mark': 1}}, Path({folder!r}))\n"
+            "from solver.progress import CancelToken, NeverCancelled\n"
+            f"task = Task(counting_job.COUNT, {{'to': 100000, 'mark': 1}}, "
+            f"Path({str(tmp_path / mark)!r}))\n"
             "ProcessEngine().run(task, lambda p: print(p['start'], flush=True), NeverCancelled())\n"
-        ).format(root=str(ROOT), here=str(HERE), folder=str(tmp_path / mark))
+        )
         (tmp_path / mark).mkdir()
         parent = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True)
         assert parent.stdout is not None
@@ -131,7 +135,7 @@ def manager(store: Store) -> Iterator[JobManager]:
     made.stop()
 
 
-def ask(store: Store, manager: JobManager, kind: str, **request: Any) -> str:
+def ask(store: Store, manager: JobManager, kind: str, **request: object) -> str:
     job = store.jobs.create(NewJob(kind, request), max_pending=100)
     manager.wake()
     return job.id
@@ -146,7 +150,9 @@ class TestJobManager:
         assert [file.name for file in store.jobs.files(job.id)] == ["numbers.txt"]
         wait_for(lambda: not files_under(store.folder / "work"))
 
-    def test_jobs_run_side_by_side_but_not_more_than_allowed(self, store: Store, manager: JobManager) -> None:
+    def test_jobs_run_side_by_side_but_not_more_than_allowed(
+        self, store: Store, manager: JobManager
+    ) -> None:
         ids = [ask(store, manager, "count", to=60) for _ in range(3)]
         wait_for(lambda: store.jobs.counts().get(JobStatus.RUNNING) == 2)
         assert store.jobs.counts() == {JobStatus.RUNNING: 2, JobStatus.PENDING: 1}
@@ -164,7 +170,9 @@ class TestJobManager:
 
     def test_a_driver_survives_whatever_a_job_does(self, store: Store, manager: JobManager) -> None:
         for how in ("segfault", "die", "raise"):
-            assert ended(store, ask(store, manager, "misbehave", how=how)).status is JobStatus.FAILED
+            assert (
+                ended(store, ask(store, manager, "misbehave", how=how)).status is JobStatus.FAILED
+            )
         assert ended(store, ask(store, manager, "count", to=1)).status is JobStatus.COMPLETED
 
     def test_cancel_a_running_and_a_pending_job(self, store: Store, manager: JobManager) -> None:

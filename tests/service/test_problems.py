@@ -9,7 +9,14 @@ from starlette.testclient import TestClient
 
 from geometry import errors
 from service.logs import JsonLines, job_id
-from service.problems import HTTP_ERRORS, KINDS, STATUS_OF_CODE, exit_code_of, problem_document, status_of
+from service.problems import (
+    HTTP_ERRORS,
+    KINDS,
+    STATUS_OF_CODE,
+    exit_code_of,
+    problem_document,
+    status_of,
+)
 from service.store.blobs import Staging
 from service.store.jobs import Jobs
 from service.wire import error_fields, error_from_fields, plain
@@ -70,7 +77,13 @@ def test_what_has_no_form_in_json_becomes_null() -> None:
         ("PUT", "/v1/designs", None, 405, "input/method-not-allowed"),
         ("POST", "/v1/designs", b"{", 400, "input/malformed-json"),
         ("POST", "/v1/designs", b"{}", 422, "input/request-invalid"),
-        ("POST", "/v1/designs", b'{"scan_id": "a", "rig": {"camers": 3}}', 422, "input/request-invalid"),
+        (
+            "POST",
+            "/v1/designs",
+            b'{"scan_id": "a", "rig": {"camers": 3}}',
+            422,
+            "input/request-invalid",
+        ),
         ("GET", "/v1/designs?limit=0", None, 422, "input/request-invalid"),
         ("GET", "/v1/designs?limit=many", None, 422, "input/request-invalid"),
         ("GET", "/v1/designs?cursor=9223372036854775808", None, 422, "input/request-invalid"),

@@ -24,7 +24,9 @@ def nothing_stays(service: Service) -> bool:
     return not any(files_under(folder / name) for name in ("blobs", "tmp", "work"))
 
 
-def test_a_scan_goes_in_and_what_was_inferred_comes_back(client: TestClient, head_file: Path) -> None:
+def test_a_scan_goes_in_and_what_was_inferred_comes_back(
+    client: TestClient, head_file: Path
+) -> None:
     answer = upload(client, head_file)
     assert answer.status_code == 201, answer.text
     scan = answer.json()
@@ -36,17 +38,23 @@ def test_a_scan_goes_in_and_what_was_inferred_comes_back(client: TestClient, hea
     assert client.get("/v1/scans").json() == {"items": [scan], "next": None}
 
 
-def test_the_same_file_is_the_same_scan(client: TestClient, head_file: Path, service: Service) -> None:
+def test_the_same_file_is_the_same_scan(
+    client: TestClient, head_file: Path, service: Service
+) -> None:
     first, again = upload(client, head_file), upload(client, head_file)
     assert (first.status_code, again.status_code) == (201, 200)
     assert first.json() == again.json()
     assert len(files_under(service.store.folder / "blobs")) == 1
 
 
-def test_reading_options_are_kept_and_make_another_scan(client: TestClient, head_file: Path) -> None:
+def test_reading_options_are_kept_and_make_another_scan(
+    client: TestClient, head_file: Path
+) -> None:
     plain = upload(client, head_file).json()
     content = head_file.read_bytes()
-    given = client.post("/v1/scans?filename=egg.ply&units=mm&up=%2Bz&subject=object", content=content).json()
+    given = client.post(
+        "/v1/scans?filename=egg.ply&units=mm&up=%2Bz&subject=object", content=content
+    ).json()
     assert given["options"] == {"units": "mm", "up": "+z", "subject": "object"}
     assert given["id"] != plain["id"]
     assert given["sha256"] == plain["sha256"]
@@ -66,7 +74,11 @@ def test_pages_of_scans(client: TestClient, head_file: Path) -> None:
         client.post(f"/v1/scans?filename=egg.ply&up={up}&subject=object", content=content)
     first = client.get("/v1/scans?limit=2").json()
     second = client.get(f"/v1/scans?limit=2&cursor={first['next']}").json()
-    assert [scan["options"]["up"] for scan in first["items"] + second["items"]] == ["+y", "-z", "+z"]
+    assert [scan["options"]["up"] for scan in first["items"] + second["items"]] == [
+        "+y",
+        "-z",
+        "+z",
+    ]
     assert second["next"] is None
 
 
@@ -132,7 +144,9 @@ class TestIdempotencyKey:
         assert first.status_code == again.status_code == 201
         assert first.json() == again.json()
 
-    def test_another_file_under_the_key_is_refused(self, client: TestClient, head_file: Path) -> None:
+    def test_another_file_under_the_key_is_refused(
+        self, client: TestClient, head_file: Path
+    ) -> None:
         headers = {"Idempotency-Key": "upload-1"}
         upload(client, head_file, headers=headers)
         other = head_file.read_bytes() + b"\n"
@@ -142,7 +156,10 @@ class TestIdempotencyKey:
 
     def test_a_failed_upload_frees_the_key(self, client: TestClient, head_file: Path) -> None:
         headers = {"Idempotency-Key": "upload-1"}
-        assert client.post("/v1/scans?filename=a.glb", content=a_zip(), headers=headers).status_code == 422
+        assert (
+            client.post("/v1/scans?filename=a.glb", content=a_zip(), headers=headers).status_code
+            == 422
+        )
         assert upload(client, head_file, headers=headers).status_code == 201
 
 
@@ -168,7 +185,9 @@ class TestOnARealServer:
         assert "/problems/too-large/upload" in answer
         assert files_under(tmp_path / "data" / "tmp") == []
 
-    def test_a_broken_upload_leaves_nothing(self, start_server: StartServer, tmp_path: Path) -> None:
+    def test_a_broken_upload_leaves_nothing(
+        self, start_server: StartServer, tmp_path: Path
+    ) -> None:
         server = start_server()
         staging = tmp_path / "data" / "tmp"
         for end in ("close", "reset"):
@@ -188,7 +207,9 @@ class TestOnARealServer:
         with server.client() as client:
             assert client.get("/v1/scans").json()["items"] == []
 
-    def test_the_service_answers_while_scans_are_read(self, start_server: StartServer, head_file: Path) -> None:
+    def test_the_service_answers_while_scans_are_read(
+        self, start_server: StartServer, head_file: Path
+    ) -> None:
         server = start_server()
         content = head_file.read_bytes()
 

@@ -97,7 +97,9 @@ def test_a_closed_store_says_so(tmp_path: Path) -> None:
 
 
 def test_two_services_cannot_share_a_folder(store: Store) -> None:
-    with pytest.raises(ConflictError, match=r"another service \(process \d+\) uses the data folder") as caught:
+    with pytest.raises(
+        ConflictError, match=r"another service \(process \d+\) uses the data folder"
+    ) as caught:
         Store(store.folder)
     assert caught.value.code == "conflict/data-folder-in-use"
 
@@ -117,7 +119,9 @@ def test_the_service_keeps_its_id(tmp_path: Path) -> None:
 
 @settings(max_examples=25, deadline=None)
 @given(content=st.binary(max_size=4096))
-def test_files_come_back_as_they_went_in(tmp_path_factory: pytest.TempPathFactory, content: bytes) -> None:
+def test_files_come_back_as_they_went_in(
+    tmp_path_factory: pytest.TempPathFactory, content: bytes
+) -> None:
     with Store(tmp_path_factory.mktemp("store")) as store:
         record = keep_scan(store, content)
         path = store.scans.path(record)
@@ -213,7 +217,12 @@ def test_events_count_from_one_and_can_be_followed_from_anywhere(store: Store) -
     store.jobs.complete(job, {}, {})
     events = store.jobs.events_after(job, 0)
     assert [event.id for event in events] == [1, 2, 3, 4, 5, 6]
-    assert [event.type for event in events] == ["pending", "running", *["progress"] * 3, "completed"]
+    assert [event.type for event in events] == [
+        "pending",
+        "running",
+        *["progress"] * 3,
+        "completed",
+    ]
     assert store.jobs.events_after(job, 4) == events[4:]
 
 
@@ -225,7 +234,9 @@ def test_the_queue_has_an_end(store: Store) -> None:
     assert caught.value.code == "conflict/queue-full"
 
 
-def test_jobs_are_removed_with_their_files_when_they_have_ended(store: Store, tmp_path: Path) -> None:
+def test_jobs_are_removed_with_their_files_when_they_have_ended(
+    store: Store, tmp_path: Path
+) -> None:
     job = add_job(store)
     with pytest.raises(ConflictError):
         store.jobs.remove(job, "count")
@@ -280,7 +291,9 @@ class TestIdempotency:
         with Store(tmp_path) as store:
             assert self.create(store, "a", "1") == first
         with sqlite3.connect(tmp_path / "rigwright.sqlite3") as connection:
-            connection.execute("UPDATE idempotency SET created_at = '2000-01-01T00:00:00.000+00:00'")
+            connection.execute(
+                "UPDATE idempotency SET created_at = '2000-01-01T00:00:00.000+00:00'"
+            )
         connection.close()
         with Store(tmp_path) as store:
             assert self.create(store, "a", "1") != first
