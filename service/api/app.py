@@ -24,8 +24,15 @@ _DESCRIPTION = (
 
 def make_app() -> FastAPI:
     """The routes without a service behind them: enough for their documentation."""
+    # The framework's pages of documentation load their scripts from elsewhere; a lab's network
+    # often has no elsewhere.
     app = FastAPI(
-        title="Rigwright", version="1", description=_DESCRIPTION, lifespan=_lifespan, redoc_url=None
+        title="Rigwright",
+        version="1",
+        description=_DESCRIPTION,
+        lifespan=_lifespan,
+        docs_url=None,
+        redoc_url=None,
     )
     app.state.routers = [module.router for module in (root, scans, designs, evaluations)]
     for router in app.state.routers:

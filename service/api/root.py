@@ -50,7 +50,7 @@ def read_service(service: ServiceDep) -> ServiceDocument:
         id=service.store.service_uuid,
         name="rigwright",
         version=program_version(),
-        links=links | {"openapi": "/openapi.json", "docs": "/docs"},
+        links=links | {"openapi": "/openapi.json"},
     )
 
 

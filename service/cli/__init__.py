@@ -165,7 +165,7 @@ def serve(
         ),
     ] = None,
 ) -> None:
-    """Offer designs over HTTP. The guide is docs/api.md; the service has it at /docs.
+    """Offer designs over HTTP, under /v1. The guide is docs/api.md.
 
     Example:  rigwright serve --port 8000 --data rigwright-data
     """

@@ -28,5 +28,5 @@ def _say_where(url: str) -> None:
     # From here on everything that happens is a line of JSON on standard error.
     set_up_logging()
     log.propagate = True
-    sys.stdout.write(f"Rigwright is at {url}/docs; stop it with Ctrl-C\n")
+    sys.stdout.write(f"Rigwright is at {url}/v1; stop it with Ctrl-C\n")
     sys.stdout.flush()

@@ -1,13 +1,17 @@
 from __future__ import annotations
 
+import ast
 import json
 import logging
+import re
 
 import pytest
 from service_helpers import ROOT
 from starlette.testclient import TestClient
 
 from geometry import errors
+from service.api.app import make_app
+from service.kinds import KINDS as JOB_KINDS
 from service.logs import JsonLines, job_id
 from service.problems import (
     HTTP_ERRORS,
@@ -17,6 +21,7 @@ from service.problems import (
     problem_document,
     status_of,
 )
+from service.settings import PREFIX, Settings
 from service.store.blobs import Staging
 from service.store.jobs import Jobs
 from service.wire import error_fields, error_from_fields, plain
@@ -152,10 +157,43 @@ def test_log_lines_are_json_with_the_job() -> None:
     assert (entry["message"], entry["job_id"], entry["seconds"]) == ("a\nline", "job-1", 1.5)
 
 
-def test_the_guide_lists_every_kind_of_error() -> None:
-    guide = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
+GUIDE = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
+
+
+def codes_in_the_code() -> set[str]:
+    """The type of every error that ``service`` itself raises."""
+    kinds = {kind.__name__: kind.kind for kind in all_errors()}
+    found = set()
+    for path in (ROOT / "service").rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if not (isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.args):
+                continue
+            detail = node.args[0]
+            if node.func.id in kinds and isinstance(detail, ast.Constant):
+                found.add(f"{kinds[node.func.id]}/{detail.value}")
+    return found
+
+
+def test_the_guide_lists_every_error() -> None:
     for name, kind in KINDS.items():
-        assert f"`{name}/" in guide, name
-        assert str(kind.status) in guide
-    for code in STATUS_OF_CODE:
-        assert f"`{code}`" in guide, code
+        assert f"| `{name}/…` | {kind.status} | {kind.exit_code} |" in GUIDE
+    framework = {f"{kind}/{detail}" for kind, detail, _ in HTTP_ERRORS.values()}
+    codes = codes_in_the_code() | set(STATUS_OF_CODE) | framework
+    assert len(codes) > 30
+    assert [code for code in sorted(codes) if f"`{code}`" not in GUIDE] == []
+
+
+def test_the_guide_lists_no_error_that_cannot_come() -> None:
+    listed = set(re.findall(r"`((?:" + "|".join(KINDS) + r")/[a-z-]+)`", GUIDE))
+    framework = {f"{kind}/{detail}" for kind, detail, _ in HTTP_ERRORS.values()}
+    of_job_kinds = {f"not-found/{kind}" for kind in JOB_KINDS}
+    assert listed - codes_in_the_code() - framework - of_job_kinds == set()
+
+
+def test_the_guide_lists_every_setting_and_path() -> None:
+    for name in Settings.model_fields:
+        assert f"`{PREFIX}{name.upper()}`" in GUIDE
+    for path in make_app().openapi()["paths"]:
+        shown = path.replace("{scan_id}", "{id}").replace("{job_id}", "{id}")
+        if not shown.startswith("/v1/evaluations/"):
+            assert shown in GUIDE or shown.removeprefix("/v1/designs/{id}") in GUIDE, shown
