@@ -44,6 +44,8 @@ class ProcessEngine:
 
     def run(self, task: Task, report: Report, cancel: CancelToken) -> dict[str, Any]:
         """See :class:`service.jobs.engine.Engine`."""
+        if cancel.is_set():
+            raise CancelledError
         with (task.folder.parent / f"{task.folder.name}.log").open("w+b") as log_file:
             with _process(task, log_file) as process:
                 outcome = self._listen(process, task, report, cancel)

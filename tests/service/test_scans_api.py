@@ -4,6 +4,7 @@ import io
 import socket
 import threading
 import zipfile
+from contextlib import closing
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -11,7 +12,9 @@ import pytest
 from service_helpers import StartServer, files_under, wait_for
 from starlette.testclient import TestClient
 
+from service.api.app import create_app
 from service.api.context import Service
+from service.settings import read_settings
 
 
 def upload(client: TestClient, path: Path, **more: object) -> object:
@@ -134,6 +137,24 @@ def test_a_body_longer_than_allowed_is_cut_off_when_no_length_was_given(
 
     answer = client.post("/v1/scans?filename=a.ply", content=endless())  # type: ignore[arg-type]
     assert answer.status_code == 413
+    assert nothing_stays(service)
+
+
+def test_a_scan_that_takes_too_long_is_refused(tmp_path: Path, head_file: Path) -> None:
+    settings = read_settings(data_dir=tmp_path / "data", scan_time_limit_s=0.05)
+    with closing(Service(settings, {})) as service, TestClient(create_app(service)) as client:
+        answer = upload(client, head_file)
+        assert (answer.status_code, answer.json()["type"]) == (413, "/problems/too-large/time")
+        assert nothing_stays(service)
+
+
+def test_a_service_that_stops_takes_no_scan(
+    client: TestClient, service: Service, head_file: Path
+) -> None:
+    service.announce_stop()
+    answer = upload(client, head_file)
+    assert answer.status_code == 503, answer.text
+    assert answer.json()["type"] == "/problems/internal/stopping"
     assert nothing_stays(service)
 
 
