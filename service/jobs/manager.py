@@ -27,6 +27,8 @@ from service.store.tables import JobStatus
 from service.wire import error_fields
 
 _RETRY_S = 1.0
+_MEDIA_TYPES = mimetypes.MimeTypes()
+_MEDIA_TYPES.add_type("model/gltf-binary", ".glb")
 
 
 class JobManager:
@@ -157,7 +159,7 @@ class JobManager:
         files = {
             path.name: (
                 self._store.files.stage_existing(path),
-                mimetypes.guess_type(path.name)[0] or "application/octet-stream",
+                _MEDIA_TYPES.guess_type(path.name)[0] or "application/octet-stream",
             )
             for path in sorted(folder.iterdir())
         }

@@ -41,15 +41,18 @@ def design_from_files(
 def demo(
     request: Request, inputs: Inputs, folder: Path, report: ProgressCallback, cancel: CancelToken
 ) -> JSON:
-    """Design the example face rig for the bundled head; both are written beside the design."""
+    """Design the example face rig for the bundled head; both are put beside the design."""
     del inputs
     report(Progress("making the head", 0.0))
-    scan = folder / "head.ply"
+    scan = folder.with_name("head.ply")
     work.write_scan(synthetic_head(), scan)
     rig = example_text("face")
-    (folder / "face.toml").write_text(rig, encoding="utf-8")
     spec = _overridden(parse_rig(rig, "face.toml"), request)
-    return _designed({**request, "scan_name": scan.name}, scan, spec, folder, report, cancel)
+    named = {**request, "scan_name": scan.name}
+    summary = _designed(named, scan, spec, folder, report, cancel)
+    scan.replace(folder / scan.name)
+    (folder / "face.toml").write_text(rig, encoding="utf-8")
+    return summary
 
 
 def evaluation(
