@@ -52,8 +52,6 @@ HTTP_ERRORS: Mapping[int, tuple[str, str, str]] = {
 """Kind, detail and remedy of the errors that the web framework raises by itself."""
 
 EXIT_INFEASIBLE = KINDS["unsatisfiable"].exit_code
-EXIT_CANCELLED = KINDS["cancelled"].exit_code
-EXIT_INTERNAL = KINDS["internal"].exit_code
 
 
 def status_of(error: RigwrightError) -> int:

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from rig.designfile import design_from_mapping
 from rig.designmodel import DesignFile
-from rig.rigfile import RigFile
+from rig.rigfile import RigFile, rig_from_mapping
 from service.api.context import ServiceDep
 from service.api.job_routes import JobResource
 from service.api.models import IdempotencyKeyHeader, Job, Model, problems
@@ -65,7 +65,7 @@ def add_evaluation(
     design = request.design.model_dump(
         by_alias=True, exclude_unset=True, include={"schema_", "name", "cameras"}
     )
-    design_from_mapping(design, "design", RigFile.model_validate(rig).to_spec().camera)
+    design_from_mapping(design, "design", rig_from_mapping(rig).camera)
     return submit(
         service, resource, {"rig": rig, "design": design}, scan, idempotency_key, response
     )

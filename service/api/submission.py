@@ -8,7 +8,7 @@ from typing import Any
 
 from fastapi import Response
 
-from rig.rigfile import RigFile
+from rig.rigfile import RigFile, rig_from_mapping
 from service.api.context import Service
 from service.api.job_routes import JobResource
 from service.store.idempotency import IdempotencyKey
@@ -24,7 +24,7 @@ def rig_for_scan(rig: RigFile, scan: ScanRecord, overrides: dict[str, Any]) -> d
     document = rig.model_dump(mode="json", by_alias=True, exclude_unset=True) | overrides
     own = {key: value for key, value in document.get("scan", {}).items() if value is not None}
     document["scan"] = {**scan.options, **own}
-    RigFile.model_validate(document).to_spec()
+    rig_from_mapping(document)
     return document
 
 

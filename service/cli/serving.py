@@ -5,19 +5,22 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from service.api.app import create_app
-from service.api.context import Service
 from service.cli.running import one_line_errors
-from service.kinds import KINDS
 from service.logs import log, set_up_logging
-from service.server import serve
 from service.settings import read_settings
 
 
 def run_serve_command(host: str | None, port: int | None, data: Path | None) -> None:
     """Serve until asked to stop."""
     with one_line_errors():
-        service = Service(read_settings(host=host, port=port, data_dir=data), KINDS)
+        settings = read_settings(host=host, port=port, data_dir=data)
+        # After the settings, so that a mistake in them is told at once.
+        from service.api.app import create_app
+        from service.api.context import Service
+        from service.kinds import KINDS
+        from service.server import serve
+
+        service = Service(settings, KINDS)
         try:
             serve(service, create_app(service), _say_where)
         finally:

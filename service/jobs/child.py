@@ -7,6 +7,7 @@ anybody to answer to. Messages go out on what was its standard output.
 
 from __future__ import annotations
 
+import errno
 import importlib
 import json
 import os
@@ -90,13 +91,23 @@ def _outcome(task: dict[str, Any], report: _Reporter, cancel: threading.Event) -
                 )
             )
         }
-    except Exception:  # noqa: BLE001 - whatever it is, the service must hear that the task failed
-        traceback.print_exc()
+    except OSError as error:
+        if error.errno not in (errno.ENOSPC, errno.EDQUOT):
+            return _crashed()
         return {
             "error": error_fields(
-                InternalError("job-crashed", "the work stopped on a fault", "see the service's log")
+                InternalError("disk-full", "the disk is full", "make room, then try again")
             )
         }
+    except Exception:  # noqa: BLE001 - whatever it is, the service must hear that the task failed
+        return _crashed()
+
+
+def _crashed() -> dict[str, Any]:
+    """The fault, told to the log in full and to the client in short."""
+    traceback.print_exc()
+    fault = InternalError("job-crashed", "the work stopped on a fault", "see the log")
+    return {"error": error_fields(fault)}
 
 
 if __name__ == "__main__":

@@ -124,7 +124,7 @@ class JobManager:
             self._bell.ring(job.id)
 
     def _give_up(self, job: JobRecord) -> None:
-        lost = InternalError("job-lost", "the job could not be finished", "see the service's log")
+        lost = InternalError("job-lost", "the job could not be finished", "see the log")
         # Where even this cannot be written, the next start finds the job and marks it.
         with suppress(SQLAlchemyError):
             self._store.jobs.end(job.id, JobStatus.FAILED, error_fields(lost))

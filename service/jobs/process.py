@@ -86,7 +86,7 @@ class ProcessEngine:
         return InternalError(
             "worker-died",
             "the process that did the work died",
-            "see the service's log, then try again",
+            "see the log, then try again",
         )
 
 

@@ -9,7 +9,9 @@ from typing import Self
 
 from alembic import command
 from alembic.config import Config
+from alembic.util import CommandError
 from sqlalchemy import Connection, insert, select
+from sqlalchemy.exc import DatabaseError
 
 from geometry.errors import InputError, InternalError
 from service.store import idempotency
@@ -49,7 +51,15 @@ class Store:
                 "give a folder you may write to with --data",
             ) from error
         self.database = Database(folder / "rigwright.sqlite3")
-        self.database.write(_migrate)
+        try:
+            self.database.write(_migrate)
+        except (CommandError, DatabaseError) as error:
+            self.close()
+            raise InputError(
+                "data-folder",
+                f"the database in {folder} is damaged or of a newer version of this program",
+                "use the newer version, or another folder with --data",
+            ) from error
         self.files = Blobs(folder)
         self.scans = Scans(self.database, self.files)
         self.jobs = Jobs(self.database, self.files)

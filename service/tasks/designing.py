@@ -12,7 +12,7 @@ from geometry.camera import RigCamera
 from geometry.head import synthetic_head
 from rig.designfile import design_from_mapping, read_design
 from rig.examples import example_text
-from rig.rigfile import RigFile, parse_rig, read_rig
+from rig.rigfile import parse_rig, read_rig, rig_from_mapping
 from rig.spec import RigSpec
 from service import work
 from solver.progress import CancelToken, Progress, ProgressCallback
@@ -26,7 +26,7 @@ def design(
     request: Request, inputs: Inputs, folder: Path, report: ProgressCallback, cancel: CancelToken
 ) -> JSON:
     """Design a rig given as JSON and write its files into ``folder``."""
-    spec = RigFile.model_validate(request["rig"]).to_spec()
+    spec = rig_from_mapping(request["rig"])
     return _designed(request, inputs["scan"], spec, folder, report, cancel)
 
 
@@ -60,7 +60,7 @@ def evaluation(
 ) -> JSON:
     """Score cameras given as JSON and write ``evaluation.json`` into ``folder``."""
     del cancel
-    spec = RigFile.model_validate(request["rig"]).to_spec()
+    spec = rig_from_mapping(request["rig"])
     cameras = design_from_mapping(request["design"], "design", spec.camera).cameras
     return _evaluated(inputs["scan"], spec, cameras, folder, report)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import errno
 import os
 import signal
 import subprocess
@@ -63,6 +64,8 @@ def misbehave(
         raise InputError("value", "seven is not a number of cameras", "give another")
     if how == "raise":
         raise ZeroDivisionError("as asked")
+    if how == "fill":
+        raise OSError(errno.ENOSPC, "No space left on device")
     if how == "segfault":
         ctypes.string_at(0)
     if how == "die":

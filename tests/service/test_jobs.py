@@ -56,7 +56,12 @@ class TestProcessEngine:
 
     @pytest.mark.parametrize(
         ("how", "detail"),
-        [("raise", "job-crashed"), ("segfault", "worker-died"), ("die", "worker-died")],
+        [
+            ("fill", "disk-full"),
+            ("raise", "job-crashed"),
+            ("segfault", "worker-died"),
+            ("die", "worker-died"),
+        ],
     )
     def test_a_crash_is_an_internal_error(self, tmp_path: Path, how: str, detail: str) -> None:
         with pytest.raises(InternalError) as caught:

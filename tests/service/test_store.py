@@ -110,6 +110,20 @@ def test_a_folder_that_cannot_be_used_is_named(tmp_path: Path) -> None:
         Store(tmp_path / "file")
 
 
+def test_a_damaged_or_newer_database_is_told(tmp_path: Path) -> None:
+    (tmp_path / "damaged").mkdir()
+    (tmp_path / "damaged" / "rigwright.sqlite3").write_bytes(b"this is not a database" * 100)
+    with pytest.raises(InputError, match="damaged"):
+        Store(tmp_path / "damaged")
+    Store(tmp_path / "newer").close()
+    with sqlite3.connect(tmp_path / "newer" / "rigwright.sqlite3") as connection:
+        connection.execute("UPDATE alembic_version SET version_num = '9999'")
+    connection.close()
+    for _ in range(2):  # the first failure must not keep the folder locked
+        with pytest.raises(InputError, match="newer version"):
+            Store(tmp_path / "newer")
+
+
 def test_the_service_keeps_its_id(tmp_path: Path) -> None:
     with Store(tmp_path) as store:
         first = store.service_uuid
