@@ -38,12 +38,9 @@ def fuzz(url: str, folder: Path, *options: str) -> None:
 
 
 def test_a_contract_fuzzer_finds_no_fault(start_server: StartServer, tmp_path: Path) -> None:
-    url = start_server().url
-    fuzz(url, tmp_path, "--phases", "examples,fuzzing", "--max-examples", "3")
-    # Every corner of every parameter; the bodies, with their thousands, are for the long run, and
-    # evaluations are served by the same code as designs.
-    some = ("--exclude-method", "POST", "--include-path-regex", "^/v1/(scans|designs)")
-    fuzz(url, tmp_path, "--phases", "coverage", *some)
+    # The phase that tries every corner of every field makes thousands of requests of the bodies.
+    options = ("--phases", "examples,fuzzing", "--max-examples", "4")
+    fuzz(start_server().url, tmp_path, *options)
 
 
 @pytest.mark.slow
