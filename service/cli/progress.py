@@ -39,14 +39,15 @@ class _Lines:
     """A line for each new stage and start, and one now and then in between."""
 
     def __init__(self) -> None:
-        self._where: tuple[str, int] | None = None
+        self._seen: set[tuple[str, int]] = set()
         self._written_s = 0.0
 
     def __call__(self, progress: dict[str, Any]) -> None:
         where, now_s = (progress["stage"], progress["start"]), time.monotonic()
-        if where == self._where and now_s - self._written_s < _LINE_EVERY_S:
+        if where in self._seen and now_s - self._written_s < _LINE_EVERY_S:
             return
-        self._where, self._written_s = where, now_s
+        self._seen.add(where)
+        self._written_s = now_s
         more = details(progress)
         line = (
             f"{100.0 * progress['fraction']:3.0f} % {progress['stage']}{': ' if more else ''}{more}"

@@ -32,14 +32,16 @@ class _Reporter:
 
     def __init__(self, out: BinaryIO) -> None:
         self._out = out
-        self._last: tuple[str, int] | None = None
+        self._seen: set[tuple[str, int]] = set()
         self._sent_s = 0.0
 
     def __call__(self, progress: Progress, /) -> None:
+        # Starts run side by side and report in turn: only the first word of each is news.
         where, now_s = (progress.stage, progress.start), time.monotonic()
-        if where == self._last and now_s - self._sent_s < _PROGRESS_INTERVAL_S:
+        if where in self._seen and now_s - self._sent_s < _PROGRESS_INTERVAL_S:
             return
-        self._last, self._sent_s = where, now_s
+        self._seen.add(where)
+        self._sent_s = now_s
         self._out.write(line({"progress": plain(progress)}))
 
 
