@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import time
@@ -54,8 +55,8 @@ def alive(mark: str) -> list[int]:
 
 
 def files_under(folder: Path) -> list[Path]:
-    """Every file below ``folder``."""
-    return sorted(path for path in folder.rglob("*") if path.is_file())
+    """Every file below ``folder``, which others may be changing."""
+    return sorted(Path(where) / name for where, _, names in os.walk(folder) for name in names)
 
 
 @dataclass

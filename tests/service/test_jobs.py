@@ -153,7 +153,7 @@ class TestJobManager:
         assert job.result == {"counted": 3, "read": {}}
         assert job.created_at <= (job.started_at or "") <= (job.ended_at or "")
         assert [file.name for file in store.jobs.files(job.id)] == ["numbers.txt"]
-        wait_for(lambda: not files_under(store.folder / "work"))
+        wait_for(lambda: not list((store.folder / "work").iterdir()))
 
     def test_jobs_run_side_by_side_but_not_more_than_allowed(
         self, store: Store, manager: JobManager
