@@ -21,7 +21,7 @@ from service.jobs.engine import JobKind, Task
 from service.store import idempotency
 from service.store.blobs import StagedFile, Staging
 from service.store.idempotency import IdempotencyKey
-from service.store.scans import ScanRecord, scan_identity
+from service.store.scans import ScanRecord, plain_name, scan_identity
 
 _WRITE_BYTES = 1 << 20
 _SUFFIX = re.compile(r"^\.[a-z0-9]{1,8}$")
@@ -171,8 +171,12 @@ def _read(service: Service, staged: StagedFile, upload: Upload) -> dict[str, Any
         memory_limit_bytes=settings.scan_memory_limit_bytes,
     )
     folder = service.store.work_folder(f"import-{secrets.token_hex(8)}")
-    task = Task(kind, {"options": upload.options}, folder, {"scan": staged.path})
+    link = folder / "inputs" / plain_name(upload.filename)
     try:
+        for path in (folder / "files", link.parent):
+            path.mkdir()
+        link.symlink_to(staged.path.resolve())
+        task = Task(kind, {"options": upload.options}, folder / "files", {"scan": link})
         return service.engine.run(task, lambda _: None, service.stopping)
     except CancelledError:
         raise InternalError(

@@ -150,8 +150,10 @@ class JobManager:
         if job.scan_id is None:
             return {}
         scan = self._store.scans.get(job.scan_id)
-        # Readers tell formats apart by the suffix, which files kept by hash do not have.
-        link = folder / f"scan{scan.suffix}"
+        # Readers tell formats apart by the suffix, which files kept by hash do not have. In a
+        # folder of its own it cannot meet another file's name.
+        link = folder / "inputs" / scan.plain_name
+        link.parent.mkdir()
         link.symlink_to(self._store.scans.path(scan).resolve())
         return {"scan": link}
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 from sqlalchemy import Connection, RowMapping, delete, exists, insert, select
@@ -33,9 +34,19 @@ class ScanRecord:
     created_at: str
 
     @property
-    def suffix(self) -> str:
-        """What kind of file it is, for example ``.glb``."""
-        return Path(self.filename).suffix.lower()
+    def plain_name(self) -> str:
+        """See :func:`plain_name`."""
+        return plain_name(self.filename)
+
+
+def plain_name(filename: str) -> str:
+    """A name for the file that any file system takes, close to the one it was given.
+
+    Readers tell formats apart by the suffix and name the file in their messages.
+    """
+    path = PurePosixPath(filename)
+    stem = re.sub(r"[^A-Za-z0-9._-]", "_", path.stem)[:80]
+    return f"{stem}{path.suffix.lower()}"
 
 
 def scan_identity(sha256: str, suffix: str, options: Mapping[str, Any]) -> str:

@@ -118,6 +118,21 @@ def test_what_is_no_scan_is_refused_and_leaves_nothing(
     assert nothing_stays(service)
 
 
+@pytest.mark.parametrize(
+    "stem", ["h\u00e9ad \U0001f600" * 20, "a\nb\x00c", "..", "a/../b", "%2e%2e", " "]
+)
+def test_any_file_name_will_do(client: TestClient, service: Service, stem: str) -> None:
+    answer = client.post("/v1/scans", params={"filename": f"{stem}.glb"}, content=a_zip())
+    assert answer.status_code == 422, answer.text
+    assert answer.json()["type"].startswith("/problems/input/")
+    assert nothing_stays(service)
+
+
+def test_messages_name_the_file_as_it_was_given(client: TestClient) -> None:
+    answer = client.post("/v1/scans?filename=my-head.glb", content=a_zip())
+    assert "my-head.glb" in answer.json()["detail"]
+
+
 def test_a_form_is_refused_with_a_hint(client: TestClient, service: Service) -> None:
     answer = client.post("/v1/scans?filename=a.ply", files={"file": b"ply"})
     assert answer.status_code == 415
