@@ -268,6 +268,7 @@ class TestOnTheCommandLine:
         shown = self.run("evaluate", out / "design.json", head, "--rig", rig_file)
         assert "sigma, largest" in shown.stdout
 
+    @pytest.mark.slow
     def test_json_is_all_there_is_on_standard_output(
         self, tmp_path: Path, head: Path, rig_file: Path
     ) -> None:
@@ -282,6 +283,7 @@ class TestOnTheCommandLine:
         assert document["constraints"]
         assert " % " in done.stderr
 
+    @pytest.mark.slow
     def test_limits_that_cannot_be_met_give_three_and_the_nearest_design(
         self, tmp_path: Path, head: Path, rig_file: Path
     ) -> None:
@@ -326,6 +328,7 @@ class TestOnTheCommandLine:
         assert "Traceback" not in done.stderr
         assert files_under(tmp_path) == before
 
+    @pytest.mark.slow
     def test_interrupting_a_solve(self, tmp_path: Path, head: Path, rig_file: Path) -> None:
         text = rig_file.read_text().replace("starts = 1", "starts = 40")
         rig_file.write_text(text.replace("cameras = 4", "cameras = 9"))
