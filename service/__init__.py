@@ -1,0 +1,1 @@
+"""The door to Rigwright: REST service, command line, jobs, storage. Computes nothing itself."""

@@ -1,0 +1,86 @@
+"""The application: all resources together."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from typing import Any
+
+from anyio import to_thread
+from fastapi import FastAPI
+from fastapi.openapi.utils import get_openapi
+
+from service.api import designs, evaluations, root, scans
+from service.api.context import Service
+from service.api.errors import install_error_handlers
+from service.api.middleware import JsonLimit, RequestLog
+from service.api.models import Problem
+
+_DESCRIPTION = (
+    "Designs multi-camera rigs that photograph a face. Lengths are in millimetres, angles in "
+    "degrees, times in UTC. Errors are problem details (RFC 9457)."
+)
+
+
+def make_app() -> FastAPI:
+    """The routes without a service behind them: enough for their documentation."""
+    # The framework's pages of documentation load their scripts from elsewhere; a lab's network
+    # often has no elsewhere.
+    app = FastAPI(
+        title="Rigwright",
+        version="1",
+        description=_DESCRIPTION,
+        lifespan=_lifespan,
+        docs_url=None,
+        redoc_url=None,
+    )
+    app.state.routers = [module.router for module in (root, scans, designs, evaluations)]
+    for router in app.state.routers:
+        app.include_router(router)
+    install_error_handlers(app)
+    app.add_middleware(JsonLimit)
+    app.add_middleware(RequestLog)
+    app.openapi = lambda: _openapi(app)  # type: ignore[method-assign]
+    return app
+
+
+def create_app(service: Service) -> FastAPI:
+    """The application of a service, which is started and stopped with it, but not closed."""
+    app = make_app()
+    app.state.service = service
+    return app
+
+
+@asynccontextmanager
+async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
+    service: Service = app.state.service
+    service.jobs.start()
+    yield
+    await to_thread.run_sync(service.stop)
+
+
+def _openapi(app: FastAPI) -> dict[str, Any]:
+    if app.openapi_schema is None:
+        document = get_openapi(
+            title=app.title, version=app.version, description=app.description, routes=app.routes
+        )
+        schemas = document.setdefault("components", {}).setdefault("schemas", {})
+        problem = Problem.model_json_schema(ref_template="#/components/schemas/{model}")
+        schemas.update(problem.pop("$defs", {}))
+        schemas["Problem"] = problem
+        _drop_the_framework_errors(document)
+        document["components"]["schemas"] = dict(sorted(schemas.items()))
+        app.openapi_schema = document
+    return app.openapi_schema
+
+
+def _drop_the_framework_errors(document: dict[str, Any]) -> None:
+    # FastAPI adds its own error shape to every operation with a parameter that does not declare
+    # 422; ours are declared where they can occur.
+    for path in document["paths"].values():
+        for operation in path.values():
+            unprocessable = operation["responses"].get("422", {})
+            if "application/json" in unprocessable.get("content", {}):
+                del operation["responses"]["422"]
+    for name in ("HTTPValidationError", "ValidationError"):
+        document["components"]["schemas"].pop(name, None)

@@ -1,0 +1,62 @@
+"""What the request handlers work with."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Mapping
+from typing import Annotated
+
+from anyio import CapacityLimiter
+from fastapi import Depends, Request
+
+from geometry.errors import InternalError
+from service.jobs.bell import Bell
+from service.jobs.engine import Engine, JobKind
+from service.jobs.manager import JobManager
+from service.jobs.process import ProcessEngine
+from service.settings import Settings
+from service.store import Store
+
+_IMPORTS_AT_ONCE = 2
+
+
+class Service:
+    """The parts of a running service. Opening it opens the store."""
+
+    def __init__(
+        self, settings: Settings, kinds: Mapping[str, JobKind], engine: Engine | None = None
+    ) -> None:
+        self.settings = settings
+        self.store = Store(settings.data_dir)
+        self.engine = engine or ProcessEngine(settings.cancel_grace_s)
+        self.bell = Bell()
+        self.jobs = JobManager(self.store, self.engine, kinds, self.bell, settings.jobs_at_once)
+        self.stopping = threading.Event()
+        self.imports = CapacityLimiter(_IMPORTS_AT_ONCE)
+
+    def announce_stop(self) -> None:
+        """End what would keep connections open: event streams and imports of scans."""
+        self.stopping.set()
+        self.bell.close()
+
+    def stop(self) -> None:
+        """Stop all work; jobs that run are marked interrupted."""
+        self.announce_stop()
+        self.jobs.stop()
+
+    def close(self) -> None:
+        """Let go of the store."""
+        self.store.close()
+
+
+def the_service(request: Request) -> Service:
+    """The service that an application was made for."""
+    service = getattr(request.app.state, "service", None)
+    if not isinstance(service, Service):
+        raise InternalError(
+            "no-service", "the application has no service", "use service.api.app.create_app"
+        )
+    return service
+
+
+ServiceDep = Annotated[Service, Depends(the_service)]

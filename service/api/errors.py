@@ -1,0 +1,127 @@
+"""Every error answer of the application, in one shape."""
+
+from __future__ import annotations
+
+import errno
+
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import JSONResponse
+from sqlalchemy.exc import OperationalError
+from starlette.exceptions import HTTPException
+from starlette.routing import Match
+
+from geometry.errors import InputError, InternalError, RigwrightError
+from service.logs import log
+from service.problems import HTTP_ERRORS, MEDIA_TYPE, problem_document
+from service.wire import error_from_fields
+
+_RETRY_AFTER_S = "5"
+
+
+def install_error_handlers(app: FastAPI) -> None:
+    """Answer every exception with problem details."""
+    app.add_exception_handler(RigwrightError, _rigwright_error)
+    app.add_exception_handler(RequestValidationError, _invalid_request)
+    app.add_exception_handler(HTTPException, _http_error)
+    app.add_exception_handler(OperationalError, _store_error)
+    app.add_exception_handler(OSError, _system_error)
+    app.add_exception_handler(Exception, _fault)
+
+
+def answer(error: RigwrightError, **more: object) -> JSONResponse:
+    """The problem details of an error."""
+    document = problem_document(error) | more
+    response = JSONResponse(
+        document, status_code=int(str(document["status"])), media_type=MEDIA_TYPE
+    )
+    if response.status_code == 503:
+        response.headers["Retry-After"] = _RETRY_AFTER_S
+    if response.status_code == 413:
+        # The rest of the body is not read, so nothing else can come on this connection.
+        response.headers["Connection"] = "close"
+    return response
+
+
+def _rigwright_error(_request: Request, error: Exception) -> JSONResponse:
+    if not isinstance(error, RigwrightError):
+        raise error
+    if error.kind == "internal":
+        log.error("internal error", exc_info=error)
+    return answer(error)
+
+
+def _invalid_request(_request: Request, error: Exception) -> JSONResponse:
+    if not isinstance(error, RequestValidationError):
+        raise error
+    found = error.errors()
+    faults = [
+        {"location": ".".join(str(part) for part in fault["loc"]), "message": fault["msg"]}
+        for fault in found
+    ]
+    if any(fault["type"] == "json_invalid" for fault in found):
+        return answer(
+            InputError("malformed-json", "the body is not JSON", "send a JSON object"),
+            errors=faults,
+        )
+    more = f" ({len(faults) - 1} more)" if len(faults) > 1 else ""
+    problem = f"{faults[0]['location']}: {faults[0]['message']}{more}"
+    return answer(
+        InputError("request-invalid", problem, "compare the request with GET /openapi.json"),
+        errors=faults,
+    )
+
+
+def _http_error(request: Request, error: Exception) -> JSONResponse:
+    if not isinstance(error, HTTPException):
+        raise error
+    kind, detail, remedy = HTTP_ERRORS.get(error.status_code, HTTP_ERRORS[400])
+    response = answer(
+        error_from_fields(
+            {"kind": kind, "detail": detail, "problem": str(error.detail).lower(), "remedy": remedy}
+        )
+    )
+    response.headers.update(error.headers or {})
+    if error.status_code == 405:
+        # The router names the methods of the first route with this path only.
+        response.headers["Allow"] = ", ".join(sorted(_methods(request)))
+    return response
+
+
+def _methods(request: Request) -> set[str]:
+    found: set[str] = set()
+    for router in request.app.state.routers:
+        for route in router.routes:
+            match, _ = route.matches(request.scope)
+            if match is not Match.NONE:
+                found |= set(route.methods)
+    return found
+
+
+def _store_error(request: Request, error: Exception) -> JSONResponse:
+    if "disk is full" in str(error):
+        return answer(_disk_full())
+    return _fault(request, error)
+
+
+def _system_error(request: Request, error: Exception) -> JSONResponse:
+    if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
+        return answer(_disk_full())
+    return _fault(request, error)
+
+
+def _disk_full() -> InternalError:
+    return InternalError(
+        "disk-full",
+        "the disk of the service is full",
+        "remove designs or scans that are not needed",
+    )
+
+
+def _fault(_request: Request, error: Exception) -> JSONResponse:
+    log.error("a request met a fault", exc_info=error)
+    return answer(
+        InternalError(
+            "fault", "the service met a fault", "see the service's log for the request's id"
+        )
+    )

@@ -1,0 +1,211 @@
+"""What every resource that is a job can do: look, listen, cancel, fetch files, remove."""
+
+# No postponed annotations here: FastAPI could not resolve those that name a local dependency.
+from collections.abc import AsyncIterator, Callable
+from typing import Annotated, Any
+
+from anyio import to_thread
+from fastapi import APIRouter, Depends
+from fastapi.responses import FileResponse
+from fastapi.sse import EventSourceResponse, ServerSentEvent
+from pydantic import BaseModel
+
+from geometry.errors import ConflictError, NotFoundError
+from service.api.context import Service, ServiceDep
+from service.api.models import Cursor, File, FileList, LastEventIdHeader, Limit, problems
+from service.problems import stored_problem
+from service.store.jobs import JobEvent, JobRecord
+
+JSON = dict[str, Any]
+_TERMINAL = ("completed", "failed", "cancelled", "interrupted")
+
+
+class JobResource:
+    """The routes of one kind of job under ``/v1/<plural>``.
+
+    ``shortcuts`` give files a path of their own: ``{"report": "report.html"}``.
+    """
+
+    def __init__(
+        self, kind: str, plural: str, model: type[BaseModel], page: type[BaseModel]
+    ) -> None:
+        self.kind = kind
+        self.path = f"/v1/{plural}"
+        self._model = model
+        self._page = page
+
+    def document(self, job: JobRecord) -> JSON:
+        """A job as it goes over HTTP."""
+        own = f"{self.path}/{job.id}"
+        links = {name: f"{own}/{name}" for name in ("events", "cancel", "files")}
+        return {
+            "id": job.id,
+            "kind": job.kind,
+            "status": job.status,
+            "scan_id": job.scan_id,
+            "cancel_requested": job.cancel_requested,
+            "created_at": job.created_at,
+            "started_at": job.started_at,
+            "ended_at": job.ended_at,
+            "progress": job.progress,
+            "result": job.result,
+            "problem": stored_problem(job.problem),
+            "links": {"self": own, **links},
+        }
+
+    def add_to(self, router: APIRouter) -> None:
+        """Add the routes that all kinds of jobs have."""
+        self._add_reading(router)
+        self._add_events(router)
+        self._add_changing(router)
+        self._add_files(router)
+
+    def _add_reading(self, router: APIRouter) -> None:
+        @router.get(self.path, response_model=self._page, responses=problems(422))
+        def list_jobs(service: ServiceDep, limit: Limit = 50, cursor: Cursor = None) -> JSON:
+            """List jobs, newest first."""
+            found = service.store.jobs.page(self.kind, limit + 1, cursor)
+            shown = found[:limit]
+            return {
+                "items": [self.document(job) for job in shown],
+                "next": shown[-1].seq if len(found) > limit else None,
+            }
+
+        @router.get(self.path + "/{job_id}", response_model=self._model, responses=problems(404))
+        def read_job(service: ServiceDep, job_id: str) -> JSON:
+            """Read the status, progress and result of a job."""
+            return self.document(service.store.jobs.get(job_id, self.kind))
+
+    def _add_events(self, router: APIRouter) -> None:
+        def existing(service: ServiceDep, job_id: str) -> JobRecord:
+            return service.store.jobs.get(job_id, self.kind)
+
+        @router.get(
+            self.path + "/{job_id}/events",
+            response_class=EventSourceResponse,
+            responses=problems(404, 422),
+        )
+        async def follow_job(
+            service: ServiceDep,
+            job: Annotated[JobRecord, Depends(existing)],
+            last_event_id: LastEventIdHeader = None,
+        ) -> AsyncIterator[ServerSentEvent]:
+            """Follow a job as server-sent events.
+
+            `pending`, `running` and `progress` come while it goes on; `completed`, `failed`,
+            `cancelled` or `interrupted` is the last event.
+            """
+            async for event in _events(service, job.id, last_event_id or 0):
+                yield event
+
+    def _add_changing(self, router: APIRouter) -> None:
+        @router.post(
+            self.path + "/{job_id}/cancel",
+            status_code=202,
+            response_model=self._model,
+            responses=problems(404, 409),
+        )
+        def cancel_job(service: ServiceDep, job_id: str) -> JSON:
+            """Ask a job to stop. Asking again changes nothing; once it has ended: 409."""
+            return self.document(service.jobs.cancel(job_id, self.kind))
+
+        @router.delete(self.path + "/{job_id}", status_code=204, responses=problems(404, 409))
+        def remove_job(service: ServiceDep, job_id: str) -> None:
+            """Remove a job that has ended, with its files."""
+            service.store.jobs.remove(job_id, self.kind)
+
+    def _add_files(self, router: APIRouter) -> None:
+        @router.get(self.path + "/{job_id}/files", response_model=FileList, responses=problems(404))
+        def list_files(service: ServiceDep, job_id: str) -> FileList:
+            """List the files a job made; none until it is completed."""
+            service.store.jobs.get(job_id, self.kind)
+            items = [
+                File(
+                    name=file.name,
+                    media_type=file.media_type,
+                    size_bytes=file.size_bytes,
+                    sha256=file.sha256,
+                    href=f"{self.path}/{job_id}/files/{file.name}",
+                )
+                for file in service.store.jobs.files(job_id)
+            ]
+            return FileList(items=items)
+
+        @router.get(
+            self.path + "/{job_id}/files/{name}",
+            response_class=FileResponse,
+            responses=problems(404, 409) | _any_file("application/octet-stream"),
+        )
+        def read_file(service: ServiceDep, job_id: str, name: str) -> FileResponse:
+            """Fetch one file by its name in the list."""
+            return self.file(service, job_id, name)
+
+    def add_shortcut(self, router: APIRouter, word: str, file_name: str, media_type: str) -> None:
+        """Give a file a path of its own, ``/{job_id}/<word>``."""
+
+        def read_shortcut(service: ServiceDep, job_id: str) -> FileResponse:
+            return self.file(service, job_id, file_name)
+
+        read_shortcut.__doc__ = f"Fetch {file_name}."
+        endpoint: Callable[..., FileResponse] = read_shortcut
+        router.get(
+            f"{self.path}/{{job_id}}/{word}",
+            name=f"read_{word}",
+            response_class=FileResponse,
+            responses=problems(404, 409) | _any_file(media_type),
+        )(endpoint)
+
+    def file(self, service: Service, job_id: str, name: str) -> FileResponse:
+        """One file of a job. The name is looked up among the job's files, never used as a path."""
+        job = service.store.jobs.get(job_id, self.kind)
+        if not job.status.terminal:
+            raise ConflictError("job-active", "the job has not ended", "wait until it is completed")
+        for file in service.store.jobs.files(job_id):
+            if file.name == name and file.path.exists():
+                return FileResponse(file.path, media_type=file.media_type)
+        raise NotFoundError(
+            "file", f"the {job.status} job has no file {name!r}", f"see {self.path}/{job_id}/files"
+        )
+
+
+def _any_file(media_type: str) -> dict[int | str, dict[str, Any]]:
+    schema = {"type": "string", "format": "binary"}
+    content = (
+        {"application/json": {}}
+        if media_type == "application/json"
+        else {media_type: {"schema": schema}}
+    )
+    return {200: {"description": "The file.", "content": content}}
+
+
+async def _events(service: Service, job_id: str, last: int) -> AsyncIterator[ServerSentEvent]:
+    with service.bell.listen(job_id) as news:
+        while not service.bell.closed:
+            # Cleared before reading: what happens after the read then sets it again.
+            news.clear()
+            # Asked before reading as well: a job seen to have ended has all its events written.
+            goes_on = await to_thread.run_sync(_goes_on, service, job_id)
+            for event in await to_thread.run_sync(service.store.jobs.events_after, job_id, last):
+                last = event.id
+                yield _sent(event)
+                if event.type in _TERMINAL:
+                    return
+            if not goes_on:
+                return
+            await news.wait()
+
+
+def _goes_on(service: Service, job_id: str) -> bool:
+    # A client that has seen the last event already, or whose job was removed, has nothing more
+    # to wait for.
+    try:
+        return not service.store.jobs.get(job_id).status.terminal
+    except NotFoundError:
+        return False
+
+
+def _sent(event: JobEvent) -> ServerSentEvent:
+    data = dict(event.data)
+    if data.get("problem") is not None:
+        data["problem"] = stored_problem(data["problem"])
+    return ServerSentEvent(data=data | {"at": event.at}, event=event.type, id=str(event.id))

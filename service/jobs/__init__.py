@@ -1,0 +1,1 @@
+"""Long work in processes of its own: what runs it, and who keeps the books."""

@@ -1,0 +1,116 @@
+"""The process of one task: ``python -m service.jobs.child``.
+
+It reads the task from its standard input, which stays open: a further line asks it to stop, and
+the end of the input means that the service is gone, so that nothing is left running without
+anybody to answer to. Messages go out on what was its standard output.
+"""
+
+from __future__ import annotations
+
+import errno
+import importlib
+import json
+import os
+import resource
+import signal
+import sys
+import threading
+import time
+import traceback
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from geometry.errors import CancelledError, InternalError, RigwrightError, TooLargeError
+from service.wire import error_fields, line, plain
+from solver.progress import Progress
+
+_PROGRESS_INTERVAL_S = 0.2
+
+
+class _Reporter:
+    """Sends progress on, at most a few times a second but never missing a new stage or start."""
+
+    def __init__(self, out: BinaryIO) -> None:
+        self._out = out
+        self._seen: set[tuple[str, int]] = set()
+        self._sent_s = 0.0
+
+    def __call__(self, progress: Progress, /) -> None:
+        # Starts run side by side and report in turn: only the first word of each is news.
+        where, now_s = (progress.stage, progress.start), time.monotonic()
+        if where in self._seen and now_s - self._sent_s < _PROGRESS_INTERVAL_S:
+            return
+        self._seen.add(where)
+        self._sent_s = now_s
+        self._out.write(line({"progress": plain(progress)}))
+
+
+def main() -> int:
+    """Do the one task and say how it ended."""
+    out = _take_standard_output()
+    task = json.loads(sys.stdin.buffer.readline())
+    cancel = threading.Event()
+    threading.Thread(target=_obey, args=(cancel,), daemon=True).start()
+    os.nice(5)  # The service must go on answering while all cores are busy.
+    limit = task["memory_limit_bytes"]
+    if limit is not None:
+        resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
+    out.write(line(_outcome(task, _Reporter(out), cancel)))
+    return 0
+
+
+def _take_standard_output() -> BinaryIO:
+    # Libraries print banners. They would garble the messages, so what they think is standard
+    # output becomes standard error.
+    out = os.fdopen(os.dup(1), "wb", buffering=0)
+    os.dup2(2, 1)
+    return out
+
+
+def _obey(cancel: threading.Event) -> None:
+    for _ in sys.stdin.buffer:
+        cancel.set()
+    os.killpg(os.getpgrp(), signal.SIGKILL)
+
+
+def _outcome(task: dict[str, Any], report: _Reporter, cancel: threading.Event) -> dict[str, Any]:
+    module, _, name = task["entry"].partition(":")
+    inputs = {role: Path(path) for role, path in task["inputs"].items()}
+    try:
+        function = getattr(importlib.import_module(module), name)
+        if cancel.is_set():
+            raise CancelledError
+        return {"result": function(task["request"], inputs, Path(task["folder"]), report, cancel)}
+    except RigwrightError as error:
+        return {"error": error_fields(error)}
+    except MemoryError:
+        return {
+            "error": error_fields(
+                TooLargeError(
+                    "memory",
+                    "the work needs more memory than is allowed",
+                    "give a smaller scan or fewer points",
+                )
+            )
+        }
+    except OSError as error:
+        if error.errno not in (errno.ENOSPC, errno.EDQUOT):
+            return _crashed()
+        return {
+            "error": error_fields(
+                InternalError("disk-full", "the disk is full", "make room, then try again")
+            )
+        }
+    except Exception:  # noqa: BLE001 - whatever it is, the service must hear that the task failed
+        return _crashed()
+
+
+def _crashed() -> dict[str, Any]:
+    """The fault, told to the log in full and to the client in short."""
+    traceback.print_exc()
+    fault = InternalError("job-crashed", "the work stopped on a fault", "see the log")
+    return {"error": error_fields(fault)}
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,179 @@
+"""Takes pending jobs from the store, has them run, and writes down how they end.
+
+The queue is the table of jobs itself: a few driver threads each claim the oldest pending job,
+hand it to the engine and wait. Nothing about a job is remembered here that the store does not
+know, except the means to cancel it.
+"""
+
+from __future__ import annotations
+
+import mimetypes
+import shutil
+import threading
+from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from sqlalchemy.exc import SQLAlchemyError
+
+from geometry.errors import CancelledError, InternalError, RigwrightError
+from service import logs
+from service.jobs.bell import Bell
+from service.jobs.engine import Engine, JobKind, Task
+from service.store import Store, interrupted
+from service.store.jobs import JobRecord
+from service.store.tables import JobStatus
+from service.wire import error_fields
+
+_RETRY_S = 1.0
+_MEDIA_TYPES = mimetypes.MimeTypes()
+_MEDIA_TYPES.add_type("model/gltf-binary", ".glb")
+
+
+class JobManager:
+    """Drives ``at_once`` jobs at a time."""
+
+    def __init__(
+        self, store: Store, engine: Engine, kinds: Mapping[str, JobKind], bell: Bell, at_once: int
+    ) -> None:
+        self._store = store
+        self._engine = engine
+        self._kinds = kinds
+        self._bell = bell
+        self._news = threading.Condition()
+        self._stopping = False
+        self._cancels: dict[str, threading.Event] = {}
+        self._drivers = [
+            threading.Thread(target=self._drive, name=f"job-driver-{n}", daemon=True)
+            for n in range(at_once)
+        ]
+
+    def start(self) -> None:
+        """Begin with what is pending."""
+        for driver in self._drivers:
+            driver.start()
+
+    def wake(self) -> None:
+        """Look for pending jobs again; to be called when one was added."""
+        with self._news:
+            self._news.notify_all()
+
+    def cancel(self, job_id: str, kind: str) -> JobRecord:
+        """Ask a job to stop. Raises :class:`~geometry.errors.ConflictError` if it has ended."""
+        record = self._store.jobs.request_cancel(job_id, kind)
+        with self._news:
+            cancel = self._cancels.get(job_id)
+        if cancel is not None:
+            cancel.set()
+        self._bell.ring(job_id)
+        return record
+
+    def stop(self) -> None:
+        """Stop what runs and mark it interrupted. What is pending begins at the next start."""
+        with self._news:
+            self._stopping = True
+            for cancel in self._cancels.values():
+                cancel.set()
+            self._news.notify_all()
+        for driver in self._drivers:
+            driver.join()
+
+    def _drive(self) -> None:
+        while (job := self._next()) is not None:
+            token = logs.job_id.set(job.id)
+            try:
+                self._run(job)
+            except Exception:  # noqa: BLE001 - the other jobs depend on this thread
+                logs.log.exception("a job could not be driven to its end")
+                self._give_up(job)
+            logs.job_id.reset(token)
+
+    def _next(self) -> JobRecord | None:
+        with self._news:
+            while not self._stopping:
+                try:
+                    job = self._store.jobs.claim_next()
+                except SQLAlchemyError:
+                    # A full disk, most likely: jobs go on when there is room again.
+                    logs.log.exception("the store cannot be written")
+                    self._news.wait(_RETRY_S)
+                    continue
+                if job is not None:
+                    self._cancels[job.id] = threading.Event()
+                    return job
+                self._news.wait()
+        return None
+
+    def _run(self, job: JobRecord) -> None:
+        self._bell.ring(job.id)
+        logs.log.info("job started", extra={"fields": {"kind": job.kind}})
+        cancel = self._cancels[job.id]
+        if self._store.jobs.get(job.id).cancel_requested:
+            # Asked for between the claim and the moment the event above could be found.
+            cancel.set()
+        folder = self._store.work_folder(job.id)
+        try:
+            self._keep(job, self._work(job, folder, cancel), folder / "files")
+        except RigwrightError as error:
+            self._end_without_result(job, error)
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
+            with self._news:
+                del self._cancels[job.id]
+            self._bell.ring(job.id)
+
+    def _give_up(self, job: JobRecord) -> None:
+        lost = InternalError("job-lost", "the job could not be finished", "see the log")
+        # Where even this cannot be written, the next start finds the job and marks it.
+        with suppress(SQLAlchemyError):
+            self._store.jobs.end(job.id, JobStatus.FAILED, error_fields(lost))
+            self._bell.ring(job.id)
+
+    def _work(self, job: JobRecord, folder: Path, cancel: threading.Event) -> dict[str, Any]:
+        if job.kind not in self._kinds:
+            raise InternalError(
+                "job-kind",
+                f"this version cannot do {job.kind!r} jobs",
+                "use the version that made the job",
+            )
+        (folder / "files").mkdir()
+
+        def report(progress: dict[str, Any]) -> None:
+            self._store.jobs.record_progress(job.id, progress)
+            self._bell.ring(job.id)
+
+        task = Task(self._kinds[job.kind], job.request, folder / "files", self._inputs(job, folder))
+        return self._engine.run(task, report, cancel)
+
+    def _inputs(self, job: JobRecord, folder: Path) -> dict[str, Path]:
+        if job.scan_id is None:
+            return {}
+        scan = self._store.scans.get(job.scan_id)
+        # Readers tell formats apart by the suffix, which files kept by hash do not have. In a
+        # folder of its own it cannot meet another file's name.
+        link = folder / "inputs" / scan.plain_name
+        link.parent.mkdir()
+        link.symlink_to(self._store.scans.path(scan).resolve())
+        return {"scan": link}
+
+    def _keep(self, job: JobRecord, result: dict[str, Any], folder: Path) -> None:
+        files = {
+            path.name: (
+                self._store.files.stage_existing(path),
+                _MEDIA_TYPES.guess_type(path.name)[0] or "application/octet-stream",
+            )
+            for path in sorted(folder.iterdir())
+        }
+        self._store.jobs.complete(job.id, result, files)
+        logs.log.info("job completed")
+
+    def _end_without_result(self, job: JobRecord, error: RigwrightError) -> None:
+        if not isinstance(error, CancelledError):
+            status, fields = JobStatus.FAILED, error_fields(error)
+        elif self._store.jobs.get(job.id).cancel_requested:
+            status, fields = JobStatus.CANCELLED, None
+        else:
+            status, fields = JobStatus.INTERRUPTED, error_fields(interrupted())
+        self._store.jobs.end(job.id, status, fields)
+        logs.log.info("job ended", extra={"fields": {"status": status, "problem": fields}})

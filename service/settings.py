@@ -1,0 +1,81 @@
+"""Settings of the service: from the environment, each with a default that suits a lab PC."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import Field, ValidationError
+from pydantic_settings import BaseSettings, SettingsConfigDict
+
+from geometry.errors import InputError
+
+PREFIX = "RIGWRIGHT_"
+
+
+def default_data_folder() -> Path:
+    """The user's data folder, as the XDG base directory specification has it."""
+    base = os.environ.get("XDG_DATA_HOME") or Path.home() / ".local" / "share"
+    return Path(base) / "rigwright"
+
+
+class Settings(BaseSettings):
+    """Set by environment variables such as ``RIGWRIGHT_PORT``."""
+
+    model_config = SettingsConfigDict(env_prefix=PREFIX, extra="forbid", frozen=True)
+
+    host: Annotated[
+        str, Field(description="Address to listen on; 127.0.0.1 is this machine only.")
+    ] = "127.0.0.1"
+    port: Annotated[
+        int, Field(ge=0, le=65535, description="Port to listen on; 0 takes a free one.")
+    ] = 8000
+    data_dir: Annotated[Path, Field(description="Folder for everything the service keeps.")] = (
+        Field(default_factory=default_data_folder)
+    )
+    max_upload_bytes: Annotated[int, Field(ge=1, description="Largest scan that is accepted.")] = (
+        512 << 20
+    )
+    jobs_at_once: Annotated[int, Field(ge=1, le=64, description="Jobs that run side by side.")] = 1
+    workers_per_job: Annotated[
+        int, Field(ge=1, le=1024, description="Processes that one design may use.")
+    ] = Field(default_factory=lambda: os.cpu_count() or 1)
+    max_queued_jobs: Annotated[int, Field(ge=1, description="Jobs that may wait.")] = 100
+    cancel_grace_s: Annotated[
+        float, Field(ge=0.0, le=60.0, description="Seconds a cancelled job has to stop by itself.")
+    ] = 0.8
+    scan_time_limit_s: Annotated[
+        float, Field(gt=0.0, description="Seconds that reading an uploaded scan may take.")
+    ] = 180.0
+    scan_memory_limit_bytes: Annotated[
+        int, Field(ge=1 << 29, description="Address space for reading an uploaded scan.")
+    ] = 8 << 30
+
+
+def read_settings(**given: object) -> Settings:
+    """The settings; ``given`` ones win over the environment.
+
+    Raises :class:`InputError` for a value that cannot be and for a name that does not exist: a
+    misspelt variable must not be ignored silently.
+    """
+    known = {PREFIX + name.upper() for name in Settings.model_fields}
+    unknown = sorted(
+        name for name in os.environ if name.upper().startswith(PREFIX) and name.upper() not in known
+    )
+    if unknown:
+        raise InputError(
+            "settings",
+            f"there is no setting {unknown[0]}",
+            f"the settings are {', '.join(sorted(known))}",
+        )
+    try:
+        return Settings.model_validate(
+            {name: value for name, value in given.items() if value is not None}
+        )
+    except ValidationError as error:
+        first = error.errors()[0]
+        name = PREFIX + str(first["loc"][0]).upper()
+        raise InputError(
+            "settings", f"{name} is {first['input']!r}", first["msg"].lower()
+        ) from error

@@ -1,0 +1,333 @@
+"""Jobs of any kind: their state, their events and the files they leave.
+
+The state of a job is written here and nowhere else. Whatever runs a job is disposable: after a
+crash the rows tell what was finished and what was not.
+"""
+
+from __future__ import annotations
+
+import uuid
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from sqlalchemy import Connection, RowMapping, delete, exists, func, insert, select, update
+
+from geometry.errors import ConflictError, NotFoundError
+from service.store import idempotency
+from service.store.blobs import Blobs, StagedFile
+from service.store.database import Database
+from service.store.idempotency import IdempotencyKey
+from service.store.tables import JobStatus, blobs, job_events, job_files, jobs, scans, utc_now
+
+JSON = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class JobRecord:
+    """A job as it stands."""
+
+    seq: int
+    id: str
+    kind: str
+    status: JobStatus
+    request: JSON
+    scan_id: str | None
+    cancel_requested: bool
+    progress: JSON | None
+    result: JSON | None
+    problem: JSON | None
+    created_at: str
+    started_at: str | None
+    ended_at: str | None
+
+
+@dataclass(frozen=True)
+class JobEvent:
+    """Something that happened to a job. ``id`` counts from 1 within the job."""
+
+    id: int
+    type: str
+    data: JSON
+    at: str
+
+
+@dataclass(frozen=True)
+class FileRecord:
+    """A file that a job left. ``path`` is where it is kept."""
+
+    name: str
+    media_type: str
+    size_bytes: int
+    sha256: str
+    path: Path
+
+
+@dataclass(frozen=True)
+class NewJob:
+    """What is asked for."""
+
+    kind: str
+    request: JSON
+    scan_id: str | None = None
+
+
+class Jobs:
+    """The jobs of a store."""
+
+    def __init__(self, database: Database, files: Blobs) -> None:
+        self._database = database
+        self._files = files
+
+    def create(
+        self,
+        new: NewJob,
+        *,
+        max_pending: int,
+        idempotency_key: IdempotencyKey | None = None,
+        request_sha256: str = "",
+    ) -> JobRecord:
+        """Add a pending job, or return the one that the same key has created before.
+
+        Raises :class:`ConflictError` when ``max_pending`` jobs are waiting already, and
+        :class:`NotFoundError` when the scan is gone.
+        """
+
+        def change(connection: Connection) -> JobRecord:
+            if idempotency_key is not None:
+                stored = idempotency.claim(connection, idempotency_key)
+                if stored is not None:
+                    return JobRecord(**_restored(idempotency.replay(stored, request_sha256)))
+            waiting = connection.scalar(
+                select(func.count()).where(jobs.c.status == JobStatus.PENDING)
+            )
+            if (waiting or 0) >= max_pending:
+                raise ConflictError(
+                    "queue-full", f"{waiting} jobs are waiting already", "try again later"
+                )
+            record = self._insert(connection, new)
+            if idempotency_key is not None:
+                given = {**record.__dict__}
+                idempotency.answer(connection, idempotency_key, request_sha256, given)
+            return record
+
+        return self._database.write(change)
+
+    def _insert(self, connection: Connection, new: NewJob) -> JobRecord:
+        job_id = str(uuid.uuid4())
+        if new.scan_id is not None and not connection.scalar(
+            select(exists().where(scans.c.id == new.scan_id))
+        ):
+            raise NotFoundError(
+                "scan", f"there is no scan {new.scan_id!r}", "upload it again, then ask again"
+            )
+        connection.execute(
+            insert(jobs).values(
+                id=job_id,
+                kind=new.kind,
+                status=JobStatus.PENDING,
+                request=new.request,
+                scan_id=new.scan_id,
+                cancel_requested=False,
+                created_at=utc_now(),
+            )
+        )
+        _append(connection, job_id, JobStatus.PENDING, {"status": JobStatus.PENDING})
+        return _one(connection, job_id)
+
+    def get(self, job_id: str, kind: str | None = None) -> JobRecord:
+        """One job, of the given kind. Raises :class:`NotFoundError`."""
+        return self._database.read(lambda connection: _one(connection, job_id, kind))
+
+    def page(self, kind: str, limit: int, before: int | None) -> list[JobRecord]:
+        """Newest first; ``before`` is the ``seq`` at which the page before ended."""
+        query = select(jobs).where(jobs.c.kind == kind).order_by(jobs.c.seq.desc()).limit(limit)
+        if before is not None:
+            query = query.where(jobs.c.seq < before)
+        return self._database.read(
+            lambda connection: [_record(row) for row in connection.execute(query).mappings()]
+        )
+
+    def counts(self) -> dict[JobStatus, int]:
+        """How many jobs are in each state."""
+        query = select(jobs.c.status, func.count()).group_by(jobs.c.status)
+        rows = self._database.read(lambda connection: connection.execute(query).all())
+        return {JobStatus(status): int(count) for status, count in rows}
+
+    def events_after(self, job_id: str, event_id: int) -> list[JobEvent]:
+        """The events of a job that follow ``event_id``, in order."""
+        query = (
+            select(job_events.c.id, job_events.c.type, job_events.c.data, job_events.c.at)
+            .where(job_events.c.job_id == job_id, job_events.c.id > event_id)
+            .order_by(job_events.c.id)
+        )
+        return self._database.read(
+            lambda connection: [JobEvent(**row) for row in connection.execute(query).mappings()]
+        )
+
+    def files(self, job_id: str) -> list[FileRecord]:
+        """The files that a job left, by name."""
+        query = (
+            select(job_files.c.name, job_files.c.media_type, blobs.c.size_bytes, blobs.c.sha256)
+            .join_from(job_files, blobs, job_files.c.blob_sha256 == blobs.c.sha256)
+            .where(job_files.c.job_id == job_id)
+            .order_by(job_files.c.name)
+        )
+        rows = self._database.read(lambda connection: connection.execute(query).mappings().all())
+        return [FileRecord(**row, path=self._files.path(row["sha256"])) for row in rows]
+
+    def claim_next(self) -> JobRecord | None:
+        """Turn the oldest pending job into a running one; None when nothing waits."""
+
+        def change(connection: Connection) -> JobRecord | None:
+            job_id = connection.scalar(
+                select(jobs.c.id)
+                .where(jobs.c.status == JobStatus.PENDING)
+                .order_by(jobs.c.seq)
+                .limit(1)
+            )
+            if job_id is None:
+                return None
+            _set_status(connection, job_id, JobStatus.RUNNING, {}, started_at=utc_now())
+            return _one(connection, job_id)
+
+        return self._database.write(change)
+
+    def record_progress(self, job_id: str, progress: JSON) -> None:
+        """Note how far a running job is."""
+
+        def change(connection: Connection) -> None:
+            connection.execute(update(jobs).where(jobs.c.id == job_id).values(progress=progress))
+            _append(connection, job_id, "progress", progress)
+
+        self._database.write(change)
+
+    def complete(
+        self, job_id: str, result: JSON, files: Mapping[str, tuple[StagedFile, str]]
+    ) -> None:
+        """The job's result and files (name: file, media type) become durable in one step."""
+
+        def change(connection: Connection) -> None:
+            for name, (staged, media_type) in files.items():
+                self._files.adopt(connection, staged)
+                connection.execute(
+                    insert(job_files).values(
+                        job_id=job_id, name=name, blob_sha256=staged.sha256, media_type=media_type
+                    )
+                )
+            _end(connection, job_id, JobStatus.COMPLETED, {"result": result}, result=result)
+
+        self._database.write(change)
+
+    def end(self, job_id: str, status: JobStatus, problem: JSON | None = None) -> None:
+        """The job ended without a result."""
+        self._database.write(
+            lambda connection: _end(
+                connection, job_id, status, {"problem": problem}, problem=problem
+            )
+        )
+
+    def request_cancel(self, job_id: str, kind: str) -> JobRecord:
+        """Ask a job to stop. A pending one ends at once; asking twice changes nothing.
+
+        Raises :class:`ConflictError` when the job has ended.
+        """
+
+        def change(connection: Connection) -> JobRecord:
+            job = _one(connection, job_id, kind)
+            if job.status.terminal:
+                raise ConflictError(
+                    "job-ended",
+                    f"the job has already ended ({job.status})",
+                    "there is nothing to cancel",
+                )
+            connection.execute(
+                update(jobs).where(jobs.c.id == job_id).values(cancel_requested=True)
+            )
+            if job.status is JobStatus.PENDING:
+                _end(connection, job_id, JobStatus.CANCELLED, {})
+            return _one(connection, job_id)
+
+        return self._database.write(change)
+
+    def remove(self, job_id: str, kind: str) -> None:
+        """Remove a job that has ended, with its events and files."""
+        unused: list[str] = []
+
+        def change(connection: Connection) -> None:
+            if not _one(connection, job_id, kind).status.terminal:
+                raise ConflictError(
+                    "job-active", "the job has not ended", "cancel it first, then remove it"
+                )
+            connection.execute(delete(jobs).where(jobs.c.id == job_id))
+            unused.extend(self._files.forget_unused(connection))
+
+        self._database.write(change, after=lambda: self._files.remove(unused))
+
+    def interrupt_running(self, problem: JSON) -> list[str]:
+        """On start: jobs that ran when the service died are marked, and their ids returned.
+
+        Pending ones stay: they had not begun, and all they need is in the store.
+        """
+
+        def change(connection: Connection) -> list[str]:
+            left = connection.scalars(select(jobs.c.id).where(jobs.c.status == JobStatus.RUNNING))
+            ids = list(left)
+            for job_id in ids:
+                _end(
+                    connection, job_id, JobStatus.INTERRUPTED, {"problem": problem}, problem=problem
+                )
+            return ids
+
+        return self._database.write(change)
+
+
+def _one(connection: Connection, job_id: str, kind: str | None = None) -> JobRecord:
+    row = connection.execute(select(jobs).where(jobs.c.id == job_id)).mappings().one_or_none()
+    if row is None or kind not in (None, row["kind"]):
+        what = kind or "job"
+        raise NotFoundError(
+            what, f"there is no {what} {job_id!r}", f"list the {what}s to see which exist"
+        )
+    return _record(row)
+
+
+def _record(row: RowMapping) -> JobRecord:
+    return replace(JobRecord(**row), status=JobStatus(row["status"]))
+
+
+def _restored(stored: JSON) -> JSON:
+    return {**stored, "status": JobStatus(stored["status"])}
+
+
+def _set_status(
+    connection: Connection,
+    job_id: str,
+    status: JobStatus,
+    event: JSON,
+    **values: Any,  # noqa: ANN401 - columns of the table
+) -> None:
+    connection.execute(update(jobs).where(jobs.c.id == job_id).values(status=status, **values))
+    _append(connection, job_id, status, {"status": status, **event})
+
+
+def _end(
+    connection: Connection,
+    job_id: str,
+    status: JobStatus,
+    event: JSON,
+    **values: Any,  # noqa: ANN401 - columns of the table
+) -> None:
+    _set_status(connection, job_id, status, event, ended_at=utc_now(), **values)
+
+
+def _append(connection: Connection, job_id: str, kind: str, data: JSON) -> None:
+    last = connection.scalar(
+        select(func.coalesce(func.max(job_events.c.id), 0)).where(job_events.c.job_id == job_id)
+    )
+    connection.execute(
+        insert(job_events).values(
+            job_id=job_id, id=(last or 0) + 1, type=str(kind), data=data, at=utc_now()
+        )
+    )

@@ -1,0 +1,82 @@
+"""A real server that also counts: the whole application plus ``/v1/counts``."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import counting_job
+from fastapi import APIRouter, FastAPI, Response
+
+from service.api.app import create_app
+from service.api.context import Service, ServiceDep
+from service.api.job_routes import JobResource
+from service.api.models import IdempotencyKeyHeader, Job, Model
+from service.kinds import KINDS
+from service.logs import set_up_logging
+from service.server import serve
+from service.settings import read_settings
+from service.store.idempotency import IdempotencyKey
+from service.store.jobs import NewJob
+
+
+class CountRequest(Model):
+    to: int
+    step_s: float = 0.01
+    deaf: bool = False
+
+
+class CountJob(Job[dict[str, Any]]):
+    pass
+
+
+class CountPage(Model):
+    items: list[CountJob]
+    next: int | None
+
+
+router = APIRouter()
+resource = JobResource("count", "counts", CountJob, CountPage)
+
+
+@router.post("/v1/counts", status_code=201, response_model=CountJob)
+def add_count(
+    request: CountRequest, response: Response, service: ServiceDep, key: IdempotencyKeyHeader = None
+) -> dict[str, Any]:
+    record = service.store.jobs.create(
+        NewJob("count", request.model_dump()),
+        max_pending=service.settings.max_queued_jobs,
+        idempotency_key=IdempotencyKey("count", key) if key else None,
+        request_sha256=request.model_dump_json(),
+    )
+    service.jobs.wake()
+    document = resource.document(record)
+    response.headers["Location"] = document["links"]["self"]
+    return document
+
+
+resource.add_to(router)
+
+
+def make(service: Service) -> FastAPI:
+    app = create_app(service)
+    app.include_router(router)
+    return app
+
+
+def say(url: str) -> None:
+    sys.stdout.write(url + "\n")
+    sys.stdout.flush()
+
+
+def main() -> None:
+    set_up_logging()
+    settings = read_settings(port=0, data_dir=Path(sys.argv[1]))
+    service = Service(settings, {**KINDS, **counting_job.KINDS})
+    serve(service, make(service), say)
+    service.close()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,82 @@
+"""What several tests of the service use."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeVar
+
+import httpx2
+
+from service.store import Store
+from service.store.jobs import JobRecord
+
+T = TypeVar("T")
+HERE = Path(__file__).parent
+ROOT = HERE.parents[1]
+
+
+def wait_for(condition: Callable[[], T | None], seconds: float = 30.0) -> T:
+    """The first true value of ``condition``; fails when there is none in time."""
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        value = condition()
+        if value:
+            return value
+        time.sleep(0.02)
+    raise AssertionError(f"nothing happened in {seconds} s")
+
+
+def ended(store: Store, job_id: str, seconds: float = 30.0) -> JobRecord:
+    """The job once it has ended."""
+
+    def look() -> JobRecord | None:
+        job = store.jobs.get(job_id)
+        return job if job.status.terminal else None
+
+    return wait_for(look, seconds)
+
+
+def alive(mark: str) -> list[int]:
+    """Processes whose command line holds ``mark``."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*/cmdline"):
+        try:
+            if mark.encode() in path.read_bytes():
+                found.append(int(path.parent.name))
+        except OSError:  # it ended between the listing and the look
+            continue
+    return found
+
+
+def files_under(folder: Path) -> list[Path]:
+    """Every file below ``folder``, which others may be changing."""
+    return sorted(Path(where) / name for where, _, names in os.walk(folder) for name in names)
+
+
+@dataclass
+class LiveServer:
+    """A real server process."""
+
+    process: subprocess.Popen[str]
+    url: str
+    log: Path
+
+    def client(self) -> httpx2.Client:
+        return httpx2.Client(base_url=self.url, timeout=30.0)
+
+    def kill(self) -> None:
+        self.process.kill()
+        self.process.wait()
+
+    def stop(self) -> int:
+        self.process.send_signal(signal.SIGTERM)
+        return self.process.wait(20.0)
+
+
+StartServer = Callable[..., LiveServer]

@@ -1,0 +1,216 @@
+from __future__ import annotations
+
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import counting_job
+import pytest
+from service_helpers import HERE, ROOT, alive, ended, files_under, wait_for
+
+from geometry.errors import CancelledError, ConflictError, InputError, InternalError, TooLargeError
+from service.jobs.bell import Bell
+from service.jobs.engine import Task
+from service.jobs.manager import JobManager
+from service.jobs.process import ProcessEngine
+from service.store import Store
+from service.store.jobs import NewJob
+from service.store.tables import JobStatus
+from solver.progress import CancelToken, NeverCancelled
+
+ENGINE = ProcessEngine(cancel_grace_s=0.5)
+
+
+def run(
+    tmp_path: Path, kind: str, request: dict[str, Any], cancel: CancelToken | None = None
+) -> dict[str, Any]:
+    folder = tmp_path / "files"
+    folder.mkdir(exist_ok=True)
+    task = Task(counting_job.KINDS[kind], request, folder)
+    return ENGINE.run(task, lambda _: None, cancel or NeverCancelled())
+
+
+class TestProcessEngine:
+    def test_it_gives_the_result_and_reports_progress(self, tmp_path: Path) -> None:
+        heard: list[dict[str, Any]] = []
+        task = Task(counting_job.COUNT, {"to": 5}, tmp_path)
+        assert ENGINE.run(task, heard.append, NeverCancelled())["counted"] == 5
+        assert [progress["start"] for progress in heard] == [0, 1, 2, 3, 4]
+        assert heard[0]["cost"] is None  # NaN has no form in JSON
+        assert (tmp_path / "numbers.txt").read_text().split() == ["0", "1", "2", "3", "4"]
+
+    def test_numerical_libraries_get_one_thread(self, tmp_path: Path) -> None:
+        threads = run(tmp_path, "misbehave", {"how": "threads"})["threads"]
+        assert threads
+        assert set(threads) == {1}
+
+    def test_errors_cross_whole(self, tmp_path: Path) -> None:
+        with pytest.raises(InputError) as caught:
+            run(tmp_path, "misbehave", {"how": "refuse"})
+        assert str(caught.value) == "seven is not a number of cameras; give another"
+        assert caught.value.detail == "value"
+
+    @pytest.mark.parametrize(
+        ("how", "detail"),
+        [
+            ("fill", "disk-full"),
+            ("raise", "job-crashed"),
+            ("segfault", "worker-died"),
+            ("die", "worker-died"),
+        ],
+    )
+    def test_a_crash_is_an_internal_error(self, tmp_path: Path, how: str, detail: str) -> None:
+        with pytest.raises(InternalError) as caught:
+            run(tmp_path, "misbehave", {"how": how})
+        assert caught.value.detail == detail
+
+    def test_memory_is_limited(self, tmp_path: Path) -> None:
+        with pytest.raises(TooLargeError) as caught:
+            run(tmp_path, "misbehave", {"how": "eat"})
+        assert caught.value.code == "too-large/memory"
+
+    def test_time_is_limited(self, tmp_path: Path) -> None:
+        began = time.monotonic()
+        with pytest.raises(TooLargeError) as caught:
+            run(tmp_path, "count-briefly", {"to": 1000})
+        assert caught.value.code == "too-large/time"
+        assert time.monotonic() - began < 3.0
+
+    def test_what_libraries_print_does_no_harm(self, tmp_path: Path) -> None:
+        assert run(tmp_path, "misbehave", {"how": "print"}) == {"how": "print"}
+        assert files_under(tmp_path) == []
+
+    @pytest.mark.parametrize("deaf", [False, True])
+    def test_cancel_acts_within_a_second(self, tmp_path: Path, deaf: bool) -> None:
+        cancel, began = threading.Event(), threading.Event()
+        asked: list[float] = []
+
+        def ask() -> None:
+            began.wait(20.0)
+            asked.append(time.monotonic())
+            cancel.set()
+
+        thread = threading.Thread(target=ask)
+        thread.start()
+        task = Task(counting_job.COUNT, {"to": 10_000, "deaf": deaf}, tmp_path)
+        with pytest.raises(CancelledError):
+            ENGINE.run(task, lambda _: began.set(), cancel)
+        thread.join()
+        assert time.monotonic() - asked[0] < 1.0
+
+    def test_processes_that_the_work_started_end_with_it(self, tmp_path: Path) -> None:
+        mark = f"left-behind-{tmp_path.name}"
+        run(tmp_path, "misbehave", {"how": "spawn", "mark": mark})
+        wait_for(lambda: not alive(mark), 5.0)
+
+    def test_nothing_outlives_the_process_that_started_it(self, tmp_path: Path) -> None:
+        mark = f"orphan-{tmp_path.name}"
+        script = (
+            f"import sys; sys.path[:0] = [{str(ROOT)!r}, {str(HERE)!r}]\n"
+            "import counting_job\n"
+            "from pathlib import Path\n"
+            "from service.jobs.engine import Task\n"
+            "from service.jobs.process import ProcessEngine\n"
+            "from solver.progress import CancelToken, NeverCancelled\n"
+            f"task = Task(counting_job.COUNT, {{'to': 100000, 'mark': 1}}, "
+            f"Path({str(tmp_path / mark)!r}))\n"
+            "ProcessEngine().run(task, lambda p: print(p['start'], flush=True), NeverCancelled())\n"
+        )
+        (tmp_path / mark).mkdir()
+        parent = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True)
+        assert parent.stdout is not None
+        assert parent.stdout.readline().strip() == "0"
+        children = Path(f"/proc/{parent.pid}/task/{parent.pid}/children").read_text().split()
+        assert len(children) == 1
+        parent.kill()
+        parent.wait()
+        parent.stdout.close()
+        wait_for(lambda: not Path(f"/proc/{children[0]}").exists(), 3.0)
+
+
+@pytest.fixture
+def manager(store: Store) -> Iterator[JobManager]:
+    made = JobManager(store, ENGINE, counting_job.KINDS, Bell(), at_once=2)
+    made.start()
+    yield made
+    made.stop()
+
+
+def ask(store: Store, manager: JobManager, kind: str, **request: object) -> str:
+    job = store.jobs.create(NewJob(kind, request), max_pending=100)
+    manager.wake()
+    return job.id
+
+
+class TestJobManager:
+    def test_a_job_goes_from_pending_to_completed(self, store: Store, manager: JobManager) -> None:
+        job = ended(store, ask(store, manager, "count", to=3))
+        assert job.status is JobStatus.COMPLETED
+        assert job.result == {"counted": 3, "read": {}}
+        assert job.created_at <= (job.started_at or "") <= (job.ended_at or "")
+        assert [file.name for file in store.jobs.files(job.id)] == ["numbers.txt"]
+        wait_for(lambda: not list((store.folder / "work").iterdir()))
+
+    def test_jobs_run_side_by_side_but_not_more_than_allowed(
+        self, store: Store, manager: JobManager
+    ) -> None:
+        ids = [ask(store, manager, "count", to=60) for _ in range(3)]
+        wait_for(lambda: store.jobs.counts().get(JobStatus.RUNNING) == 2)
+        assert store.jobs.counts() == {JobStatus.RUNNING: 2, JobStatus.PENDING: 1}
+        assert {ended(store, job).status for job in ids} == {JobStatus.COMPLETED}
+
+    def test_a_failed_job_tells_why(self, store: Store, manager: JobManager) -> None:
+        job = ended(store, ask(store, manager, "misbehave", how="refuse"))
+        assert job.status is JobStatus.FAILED
+        assert (job.problem or {})["problem"] == "seven is not a number of cameras"
+        assert store.jobs.files(job.id) == []
+
+    def test_a_job_nobody_can_do_fails(self, store: Store, manager: JobManager) -> None:
+        job = ended(store, ask(store, manager, "unheard-of"))
+        assert (job.problem or {})["detail"] == "job-kind"
+
+    def test_a_driver_survives_whatever_a_job_does(self, store: Store, manager: JobManager) -> None:
+        for how in ("segfault", "die", "raise"):
+            assert (
+                ended(store, ask(store, manager, "misbehave", how=how)).status is JobStatus.FAILED
+            )
+        assert ended(store, ask(store, manager, "count", to=1)).status is JobStatus.COMPLETED
+
+    def test_cancel_a_running_and_a_pending_job(self, store: Store, manager: JobManager) -> None:
+        running = [ask(store, manager, "count", to=10_000) for _ in range(2)]
+        wait_for(lambda: store.jobs.counts().get(JobStatus.RUNNING) == 2)
+        pending = ask(store, manager, "count", to=1)
+        assert manager.cancel(pending, "count").status is JobStatus.CANCELLED
+        for job in running:
+            wait_for(lambda job=job: store.jobs.get(job).progress)
+            assert manager.cancel(job, "count").cancel_requested
+            began = time.monotonic()
+            assert ended(store, job).status is JobStatus.CANCELLED
+            assert time.monotonic() - began < 1.0
+            with pytest.raises(ConflictError) as caught:
+                manager.cancel(job, "count")
+            assert caught.value.code == "conflict/job-ended"
+
+    def test_cancel_before_the_work_has_begun(self, store: Store, manager: JobManager) -> None:
+        for _ in range(5):
+            job = ask(store, manager, "count", to=10_000)
+            manager.cancel(job, "count")
+            assert ended(store, job).status is JobStatus.CANCELLED
+
+    def test_stopping_interrupts_what_runs_and_leaves_what_waits(self, store: Store) -> None:
+        manager = JobManager(store, ENGINE, counting_job.KINDS, Bell(), at_once=1)
+        manager.start()
+        running = ask(store, manager, "count", to=10_000)
+        wait_for(lambda: store.jobs.get(running).progress)
+        waiting = ask(store, manager, "count", to=1)
+        manager.stop()
+        assert store.jobs.get(running).status is JobStatus.INTERRUPTED
+        assert store.jobs.get(waiting).status is JobStatus.PENDING
+        again = JobManager(store, ENGINE, counting_job.KINDS, Bell(), at_once=1)
+        again.start()
+        assert ended(store, waiting).status is JobStatus.COMPLETED
+        again.stop()
