@@ -28,17 +28,6 @@ IPOPT_OPTIONS: dict[str, int | float | str] = {
     "mu_strategy": "adaptive",
 }
 
-WARM_OPTIONS: dict[str, int | float | str] = {
-    "warm_start_init_point": "yes",
-    "warm_start_bound_push": 1e-6,
-    "warm_start_bound_frac": 1e-6,
-    "warm_start_slack_bound_push": 1e-6,
-    "warm_start_slack_bound_frac": 1e-6,
-    "warm_start_mult_bound_push": 1e-6,
-    "mu_strategy": "monotone",
-    "mu_init": 1e-4,
-}
-
 _WORDS = {
     0: "the optimality conditions hold to the tolerance",
     1: "the optimality conditions hold to the looser, acceptable tolerance",
@@ -62,7 +51,6 @@ class Outcome:
 
     variables: Floats
     multipliers: Floats
-    bound_multipliers: tuple[Floats, Floats]
     kkt_error: float
     iterations: int
     success: bool
@@ -70,20 +58,10 @@ class Outcome:
     why: str
 
 
-@dataclass(frozen=True, eq=False)
-class WarmStart:
-    """Multipliers of an earlier solve: of the rows, of the lower and of the upper bounds."""
-
-    rows: Floats
-    below: Floats
-    above: Floats
-
-
 def solve_ipopt(
     programme: Programme,
     start: Floats,
     watch: Watch,
-    warm: WarmStart | None = None,
     options: dict[str, int | float | str] | None = None,
 ) -> Outcome:
     """Interior point with exact second derivatives (COIN-OR IPOPT, MUMPS inside)."""
@@ -107,24 +85,42 @@ def solve_ipopt(
         return go_on
 
     problem = ipyopt.Problem(
-        n=programme.size, x_l=_wide(low), x_u=_wide(high), m=programme.rows,
-        g_l=_wide(row_low), g_u=_wide(row_high),
+        n=programme.size,
+        x_l=_wide(low),
+        x_u=_wide(high),
+        m=programme.rows,
+        g_l=_wide(row_low),
+        g_u=_wide(row_high),
         sparsity_indices_jac_g=programme.jacobian_pattern,
         sparsity_indices_h=programme.hessian_pattern,
-        eval_f=programme.objective, eval_grad_f=into(programme.gradient), eval_g=into(programme.values),
-        eval_jac_g=into(programme.jacobian), eval_h=into(programme.hessian),
-        intermediate_callback=intermediate, ipopt_options=IPOPT_OPTIONS | (WARM_OPTIONS if warm is not None else {}) | (options or {}),
-    )  # fmt: skip
-    multipliers, below, above = np.zeros(programme.rows), np.zeros(programme.size), np.zeros(programme.size)
-    if warm is not None:
-        multipliers, below, above = warm.rows.copy(), warm.below.copy(), warm.above.copy()
+        eval_f=programme.objective,
+        eval_grad_f=into(programme.gradient),
+        eval_g=into(programme.values),
+        eval_jac_g=into(programme.jacobian),
+        eval_h=into(programme.hessian),
+        intermediate_callback=intermediate,
+        ipopt_options=IPOPT_OPTIONS | (options or {}),
+    )
+    multipliers, below, above = (
+        np.zeros(programme.rows),
+        np.zeros(programme.size),
+        np.zeros(programme.size),
+    )
     inside = np.clip(start, low, high)
     x, _, status = problem.solve(inside, mult_g=multipliers, mult_x_L=below, mult_x_U=above)
     x = np.asarray(x)
     kkt = kkt_error(programme, x, multipliers, above - below)
     why = _WORDS.get(status, f"IPOPT ended with status {status}")
     stopped = bool(reached["stopped"])
-    return Outcome(x, multipliers, (below, above), kkt, int(reached["iterations"]), status in (0, 1), stopped, why)
+    return Outcome(
+        x,
+        multipliers,
+        kkt,
+        int(reached["iterations"]),
+        status in (0, 1),
+        stopped,
+        why,
+    )
 
 
 def _wide(bounds: Floats) -> Floats:
@@ -136,7 +132,9 @@ class _Stopped(Exception):  # noqa: N818 - a signal, not an error
     """Raised out of SciPy's callback to end a run."""
 
 
-def solve_slsqp(programme: Programme, start: Floats, watch: Watch, max_iterations: int = 500) -> Outcome:
+def solve_slsqp(
+    programme: Programme, start: Floats, watch: Watch, max_iterations: int = 500
+) -> Outcome:
     """Sequential least squares programming with exact first derivatives (SciPy)."""
     from scipy.optimize import Bounds, minimize
 
@@ -171,12 +169,19 @@ def solve_slsqp(programme: Programme, start: Floats, watch: Watch, max_iteration
 
     try:
         result = minimize(
-            programme.objective, latest["x"], jac=programme.gradient, method="SLSQP", callback=callback,
-            bounds=Bounds(*programme.bounds), constraints=constraints,
+            programme.objective,
+            latest["x"],
+            jac=programme.gradient,
+            method="SLSQP",
+            callback=callback,
+            bounds=Bounds(*programme.bounds),
+            constraints=constraints,
             options={"maxiter": max_iterations, "ftol": 1e-12},
-        )  # fmt: skip
+        )
     except _Stopped:
-        return Outcome(latest["x"], np.zeros(0), np.nan, int(latest["iterations"]), False, True, _WORDS[5])
+        return Outcome(
+            latest["x"], np.zeros(0), np.nan, int(latest["iterations"]), False, True, _WORDS[5]
+        )
     why = str(result.message).rstrip(".").lower()
     return Outcome(result.x, np.zeros(0), np.nan, int(result.nit), bool(result.success), False, why)
 
@@ -190,7 +195,9 @@ def violation(programme: Programme, variables: Floats) -> float:
     return float(max(rows, np.maximum(x_low - variables, variables - x_high).max(initial=0.0), 0.0))
 
 
-def kkt_error(programme: Programme, variables: Floats, multipliers: Floats, bound_multipliers: Floats) -> float:
+def kkt_error(
+    programme: Programme, variables: Floats, multipliers: Floats, bound_multipliers: Floats
+) -> float:
     """Largest entry of the gradient of ``f + multipliers . rows + bound_multipliers . x``."""
     residual = programme.gradient(variables) + bound_multipliers
     row, column = programme.jacobian_pattern

@@ -19,14 +19,20 @@ def rotation(angles: Any, base: Floats) -> Any:
     """``M = Mk(kappa) Mp(phi) Mw(omega) M0`` as a symbolic 3 x 3 matrix."""
     w, p, k = angles[0], angles[1], angles[2]
     one, zero = 1, 0
-    mw = ca.blockcat([[one, zero, zero], [zero, ca.cos(w), ca.sin(w)], [zero, -ca.sin(w), ca.cos(w)]])
-    mp = ca.blockcat([[ca.cos(p), zero, -ca.sin(p)], [zero, one, zero], [ca.sin(p), zero, ca.cos(p)]])
-    mk = ca.blockcat([[ca.cos(k), ca.sin(k), zero], [-ca.sin(k), ca.cos(k), zero], [zero, zero, one]])
+    mw = ca.blockcat(
+        [[one, zero, zero], [zero, ca.cos(w), ca.sin(w)], [zero, -ca.sin(w), ca.cos(w)]]
+    )
+    mp = ca.blockcat(
+        [[ca.cos(p), zero, -ca.sin(p)], [zero, one, zero], [ca.sin(p), zero, ca.cos(p)]]
+    )
+    mk = ca.blockcat(
+        [[ca.cos(k), ca.sin(k), zero], [-ca.sin(k), ca.cos(k), zero], [zero, zero, one]]
+    )
     return mk @ mp @ mw @ ca.DM(base)
 
 
 def image_point(pose: Any, base: Floats, point: Any) -> Any:
-    """Eq 5: x and y of a point for unit focal length; ``pose`` are three angles and three coordinates."""
+    """Eq 5: x and y of a point for unit focal length; ``pose``: three angles, three coordinates."""
     local = rotation(pose[0:3], base) @ (point - pose[3:6])
     return ca.vertcat(-local[0] / local[2], -local[1] / local[2])
 
@@ -44,7 +50,9 @@ def point_cost(unknowns: Unknowns, prior: float) -> Any:
     return ca.Function("norm_q", [x, point, weight], [ca.sqrt(ca.sumsqr(q))])
 
 
-def cost_expression(unknowns: Unknowns, points: Floats, weight: Floats, prior: float, scale: float) -> tuple[Any, Any]:
+def cost_expression(
+    unknowns: Unknowns, points: Floats, weight: Floats, prior: float, scale: float
+) -> tuple[Any, Any]:
     """The unknowns as a symbol and the mean cost as an expression of it."""
     x = ca.MX.sym("x", PER_CAMERA * unknowns.count)
     each = point_cost(unknowns, prior).map(len(points))

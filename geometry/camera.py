@@ -1,4 +1,4 @@
-"""The camera: sensor, lens, interior orientation, body. Projections happen here and nowhere else."""
+"""The camera: sensor, lens, interior orientation, body. Projections happen here only."""
 
 from __future__ import annotations
 
@@ -66,21 +66,25 @@ class Body:
         size, centre = frozen(self.size_mm), frozen(self.centre_camera_mm)
         _require(
             size.shape == (3,) and bool(np.isfinite(size).all()) and bool((size > 0).all()),
-            "body-size", "the camera body's size must be three positive lengths",
+            "body-size",
+            "the camera body's size must be three positive lengths",
             "give size_mm = [width, height, depth]",
         )
         _require(
             centre.shape == (3,) and bool(np.isfinite(centre).all()),
-            "body-centre", "the camera body's centre must be three finite numbers",
+            "body-centre",
+            "the camera body's centre must be three finite numbers",
             "give centre_mm = [x, y, z] in the camera frame",
         )
         _require(
             self.lens_diameter_mm >= 0.0 and self.lens_length_mm >= 0.0,
-            "lens-size", "the lens cannot have a negative size", "give lengths of zero or more",
+            "lens-size",
+            "the lens cannot have a negative size",
+            "give lengths of zero or more",
         )
         thread = frozen(self.mount_thread_camera_mm)
         if thread.shape != (3,) or not np.isfinite(thread).all():
-            thread = frozen(centre + [0.0, size[1] / 2.0, 0.0])
+            thread = frozen(centre + np.array([0.0, size[1] / 2.0, 0.0]))
         object.__setattr__(self, "size_mm", size)
         object.__setattr__(self, "centre_camera_mm", centre)
         object.__setattr__(self, "mount_thread_camera_mm", thread)
@@ -119,21 +123,27 @@ class Camera:
             value = getattr(self, label)
             _require(
                 bool(np.isfinite(value)) and value > 0.0,
-                "camera-value", f"{label} of camera {self.name!r} is {value}", "give a positive number",
+                "camera-value",
+                f"{label} of camera {self.name!r} is {value}",
+                "give a positive number",
             )
         _require(
             min(self.image_size_px) >= 2,
-            "camera-image-size", f"camera {self.name!r} has images of {self.image_size_px} pixels",
+            "camera-image-size",
+            f"camera {self.name!r} has images of {self.image_size_px} pixels",
             "give image_size_px = [width, height]",
         )
         nearest = self.focal_length_mm
         _require(
             self.min_focus_distance_mm > nearest
-            and (self.focus_distance_mm is None or self.focus_distance_mm >= self.min_focus_distance_mm),
+            and (
+                self.focus_distance_mm is None
+                or self.focus_distance_mm >= self.min_focus_distance_mm
+            ),
             "camera-focus",
-            f"camera {self.name!r} is focused nearer than its minimum, or its minimum focus distance "
-            f"is not beyond the focal length of {nearest:g} mm",
-            "give min_focus_distance_mm > focal_length_mm and focus_distance_mm >= min_focus_distance_mm",
+            f"camera {self.name!r} is focused nearer than its minimum, or its minimum focus "
+            f"distance is not beyond the focal length of {nearest:g} mm",
+            "give focal_length_mm < min_focus_distance_mm <= focus_distance_mm",
         )
         centre = np.array(self.principal_point_px, dtype=np.float64)
         if centre.shape != (2,) or not np.isfinite(centre).all():
@@ -141,12 +151,15 @@ class Camera:
         distortion = frozen(self.distortion)
         _require(
             distortion.shape == (5,) and bool(np.isfinite(distortion).all()),
-            "camera-distortion", f"camera {self.name!r} does not have five finite distortion terms",
+            "camera-distortion",
+            f"camera {self.name!r} does not have five finite distortion terms",
             "give distortion = [k1, k2, p1, p2, k3]",
         )
         object.__setattr__(self, "principal_point_px", frozen(centre))
         object.__setattr__(self, "distortion", distortion)
-        object.__setattr__(self, "image_size_px", (int(self.image_size_px[0]), int(self.image_size_px[1])))
+        object.__setattr__(
+            self, "image_size_px", (int(self.image_size_px[0]), int(self.image_size_px[1]))
+        )
 
     @property
     def focal_length_px(self) -> float:
@@ -162,7 +175,9 @@ class Camera:
     @property
     def sensor_size_mm(self) -> tuple[float, float]:
         """Width and height of the sensor."""
-        return self.image_size_px[0] * self.pixel_pitch_mm, self.image_size_px[1] * self.pixel_pitch_mm
+        return self.image_size_px[0] * self.pixel_pitch_mm, self.image_size_px[
+            1
+        ] * self.pixel_pitch_mm
 
     @property
     def field_of_view_deg(self) -> tuple[float, float]:
@@ -186,7 +201,8 @@ class Camera:
         ys = np.linspace(-0.5 + margin_px, h - 0.5 - margin_px, 65)
         _require(
             xs[0] < xs[-1] and ys[0] < ys[-1],
-            "frame-margin", f"a frame margin of {margin_px:g} px leaves nothing of the image",
+            "frame-margin",
+            f"a frame margin of {margin_px:g} px leaves nothing of the image",
             "give a smaller frame margin_px",
         )
         edges = [self._normalised(np.full(65, v), ys) for v in (xs[0], xs[-1])]
@@ -199,12 +215,14 @@ class Camera:
         return undistort((pixels - self.principal_point_px) / self.focal_length_px, self.distortion)
 
     def project(self, pose: Pose, points_rig_mm: Floats) -> tuple[Floats, Floats]:
-        """Pixel coordinates (N, 2) and depths (N,) of points (N, 3); NaN pixels behind the camera."""
+        """Pixels (N, 2), NaN behind the camera, and depths (N,) of points (N, 3)."""
         local = pose.to_camera(points_rig_mm)
         depth = local[:, 2]
         with np.errstate(divide="ignore", invalid="ignore"):
             normalised = np.where(depth[:, None] > 0.0, local[:, :2] / depth[:, None], np.nan)
-        pixels = distort(normalised, self.distortion) * self.focal_length_px + self.principal_point_px
+        pixels = (
+            distort(normalised, self.distortion) * self.focal_length_px + self.principal_point_px
+        )
         return pixels, depth
 
     def rays(self, pixels: Floats) -> Floats:

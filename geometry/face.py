@@ -47,7 +47,9 @@ class RegionBox:
     def __post_init__(self) -> None:
         low, high = frozen(self.low_mm), frozen(self.high_mm)
         if low.shape != (3,) or high.shape != (3,) or not (low < high).all():
-            raise InputError("region-box", "the region's box is not low < high in x, y and z", "give two corners")
+            raise InputError(
+                "region-box", "the region's box is not low < high in x, y and z", "give two corners"
+            )
         object.__setattr__(self, "low_mm", low)
         object.__setattr__(self, "high_mm", high)
 
@@ -67,7 +69,9 @@ class RegionSphere:
         centre = frozen(self.centre_mm)
         if centre.shape != (3,) or not np.isfinite(centre).all() or not self.radius_mm > 0.0:
             raise InputError(
-                "region-sphere", "the region's sphere is malformed", "give centre_mm of 3 numbers and a positive radius_mm"
+                "region-sphere",
+                "the region's sphere is malformed",
+                "give centre_mm of 3 numbers and a positive radius_mm",
             )
         object.__setattr__(self, "centre_mm", centre)
 
@@ -122,6 +126,7 @@ def _nose_score(depth: Floats) -> Floats:
     A nose tip stands out by several millimetres against both sides, above and below, more
     sharply than the face as a whole does against the cheeks: a ball does not.
     """
+
     def drop(dx: float, dz: float) -> Floats:
         return _shifted(depth, dx, dz) - depth
 
@@ -154,7 +159,8 @@ def nose_tip(scan: Scan, occluder: Occluder) -> Floats:
     score = _nose_score(smooth)
     if not np.isfinite(score).any():
         raise InputError(
-            "face-not-found", "no face was found in the scan",
+            "face-not-found",
+            "no face was found in the scan",
             "check its units, up and front, or give the region as a box or a sphere",
         )
     row, column = np.unravel_index(int(np.argmax(score)), score.shape)
@@ -168,8 +174,10 @@ def _look_directions() -> Floats:
     """Directions (m, 3) towards the front, within 60 degrees of it."""
     steps = np.radians(np.arange(-_LOOK_DEG, _LOOK_DEG + 1.0, _LOOK_STEP_DEG))
     yaw, pitch = (g.ravel() for g in np.meshgrid(steps, steps))
-    out = np.stack([np.sin(yaw) * np.cos(pitch), -np.cos(yaw) * np.cos(pitch), np.sin(pitch)], axis=1)
-    return out[out @ FORWARD_RIG >= np.cos(np.radians(_LOOK_DEG)) - 1e-9]
+    out = np.stack(
+        [np.sin(yaw) * np.cos(pitch), -np.cos(yaw) * np.cos(pitch), np.sin(pitch)], axis=1
+    )
+    return np.asarray(out[out @ FORWARD_RIG >= np.cos(np.radians(_LOOK_DEG)) - 1e-9])
 
 
 def reachable(points: SurfacePoints, occluder: Occluder) -> Bools:
@@ -195,7 +203,10 @@ def connected_to(points_mm: Floats, seed_mm: Floats) -> Bools:
 
 
 def find_face(
-    scan: Scan, samples: SurfacePoints, radius_mm: float = RADIUS_MM, max_normal_deg: float = MAX_NORMAL_DEG
+    scan: Scan,
+    samples: SurfacePoints,
+    radius_mm: float = RADIUS_MM,
+    max_normal_deg: float = MAX_NORMAL_DEG,
 ) -> tuple[FaceRegion, SurfacePoints]:
     """The face region and those of the ``samples`` that belong to it.
 
@@ -207,7 +218,8 @@ def find_face(
     facing = samples.normals @ FORWARD_RIG >= np.cos(np.radians(max_normal_deg))
     if not (near & facing).any():
         raise InputError(
-            "face-not-found", "nothing near the nose tip faces the front",
+            "face-not-found",
+            "nothing near the nose tip faces the front",
             "check up and front of the scan, or give the region as a box or a sphere",
         )
     face = samples.subset(near & facing)
@@ -215,7 +227,8 @@ def find_face(
     open_ = reachable(face, occluder)
     if not open_.any():
         raise InputError(
-            "face-not-found", "no point of the face can be seen from the front",
+            "face-not-found",
+            "no point of the face can be seen from the front",
             "check that the scan's front faces the cameras",
         )
     excluded = float(1.0 - open_.mean())

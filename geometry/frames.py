@@ -66,10 +66,12 @@ def omega_phi_kappa_from_rotation(rotation_rig_to_camera: Floats) -> Floats:
     else:
         omega = np.arctan2(-m[2, 1], m[2, 2])
         kappa = np.arctan2(-m[1, 0], m[0, 0])
-    return np.degrees(np.array([omega, phi, kappa]))
+    return np.asarray(np.degrees([omega, phi, kappa]))
 
 
-def look_at_rotation(position_rig_mm: Floats, target_rig_mm: Floats, roll_deg: float = 0.0) -> Floats:
+def look_at_rotation(
+    position_rig_mm: Floats, target_rig_mm: Floats, roll_deg: float = 0.0
+) -> Floats:
     """``rotation_rig_to_camera`` (3, 3) of a camera that looks from position to target.
 
     At roll 0 the image's x axis is level and its y axis points down; positive roll turns the
@@ -78,7 +80,9 @@ def look_at_rotation(position_rig_mm: Floats, target_rig_mm: Floats, roll_deg: f
     forward = np.asarray(target_rig_mm, dtype=np.float64) - position_rig_mm
     distance = float(np.linalg.norm(forward))
     if distance == 0.0:
-        raise InputError("pose-degenerate", "a camera stands on the point it looks at", "move one of them")
+        raise InputError(
+            "pose-degenerate", "a camera stands on the point it looks at", "move one of them"
+        )
     forward = forward / distance
     right = np.cross(forward, [0.0, 0.0, 1.0])
     length = float(np.linalg.norm(right))
@@ -132,12 +136,16 @@ class Pose:
             raise InputError("pose-not-finite", "a pose holds NaN or infinity", remedy)
         off = float(np.abs(rotation @ rotation.T - np.eye(3)).max())
         if off > _ORTHOGONALITY_TOLERANCE or np.linalg.det(rotation) < 0.0:
-            raise InputError("pose-not-a-rotation", "the matrix of a pose is not a rotation", remedy)
+            raise InputError(
+                "pose-not-a-rotation", "the matrix of a pose is not a rotation", remedy
+            )
         object.__setattr__(self, "position_rig_mm", position)
         object.__setattr__(self, "rotation_rig_to_camera", rotation)
 
     @classmethod
-    def looking_at(cls, position_rig_mm: Floats, target_rig_mm: Floats, roll_deg: float = 0.0) -> Self:
+    def looking_at(
+        cls, position_rig_mm: Floats, target_rig_mm: Floats, roll_deg: float = 0.0
+    ) -> Self:
         """A camera at ``position_rig_mm`` that looks at ``target_rig_mm``."""
         position = np.asarray(position_rig_mm, dtype=np.float64)
         return cls(position, look_at_rotation(position, target_rig_mm, roll_deg))
@@ -160,7 +168,7 @@ class Pose:
     @property
     def axis_rig(self) -> Floats:
         """Unit vector along the optical axis, away from the camera, (3,)."""
-        return self.rotation_rig_to_camera[2]
+        return np.asarray(self.rotation_rig_to_camera[2])
 
     def to_camera(self, points_rig_mm: Floats) -> Floats:
         """Points (N, 3) of the rig frame in the camera frame, (N, 3), millimetres."""

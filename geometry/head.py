@@ -86,7 +86,9 @@ def _measures(shape: HeadShape) -> Measures:
     """The measures in template millimetres: the template is stretched to the head's size."""
     kx, ky, kz = (
         size / template
-        for size, template in zip((shape.width_mm, shape.depth_mm, shape.height_mm), TEMPLATE_SIZE_MM, strict=True)
+        for size, template in zip(
+            (shape.width_mm, shape.depth_mm, shape.height_mm), TEMPLATE_SIZE_MM, strict=True
+        )
     )
     return Measures(
         face_half_width=shape.face_width_mm / (2.0 * kx),
@@ -108,8 +110,10 @@ def _measures(shape: HeadShape) -> Measures:
     )
 
 
-def _axis(low: float, high: float, fine_low: float, fine_high: float, fine: float, coarse: float) -> Floats:
-    """Grid nodes from low to high, ``fine`` apart between the fine limits and ``coarse`` elsewhere."""
+def _axis(
+    low: float, high: float, fine_low: float, fine_high: float, fine: float, coarse: float
+) -> Floats:
+    """Grid nodes from low to high, ``fine`` apart between the fine limits, else ``coarse``."""
     parts = [
         np.arange(fine_low, low - coarse, -coarse)[::-1],
         np.arange(fine_low + fine, fine_high, fine),
@@ -147,7 +151,9 @@ def synthetic_head(shape: HeadShape | None = None, seed: int = 0) -> Scan:
     axes = _grid(measures)
     vertices, faces = largest_piece(*surface_nets(unambiguous(grid_values(field, axes)), axes))
     vertices = settle(vertices, field)
-    size = np.array([chosen.width_mm, chosen.depth_mm, chosen.height_mm]) / np.array(TEMPLATE_SIZE_MM)
+    size = np.array([chosen.width_mm, chosen.depth_mm, chosen.height_mm]) / np.array(
+        TEMPLATE_SIZE_MM
+    )
     vertices = vertices * size
     note = ScanNote("inferred", f"synthetic head, seed {seed}: millimetres, in the rig frame")
     return Scan(vertices, faces, vertex_normals(vertices, faces), (note,))
@@ -167,11 +173,24 @@ def _relief(seed: int) -> Callable[[Floats], Floats]:
 
 
 _SPREAD_MM = {
-    "width_mm": 5.5, "height_mm": 8.0, "depth_mm": 7.0, "face_width_mm": 5.0, "jaw_width_mm": 5.5,
-    "chin_mm": 2.0, "brow_mm": 1.5, "eye_spacing_mm": 3.2, "eye_depth_mm": 1.2, "nose_length_mm": 3.2,
-    "nose_protrusion_mm": 2.4, "nose_width_mm": 2.8, "mouth_width_mm": 3.2, "lip_mm": 0.8,
-    "ear_length_mm": 4.0, "ear_protrusion_mm": 3.0, "neck_width_mm": 7.0,
-}  # fmt: skip
+    "width_mm": 5.5,
+    "height_mm": 8.0,
+    "depth_mm": 7.0,
+    "face_width_mm": 5.0,
+    "jaw_width_mm": 5.5,
+    "chin_mm": 2.0,
+    "brow_mm": 1.5,
+    "eye_spacing_mm": 3.2,
+    "eye_depth_mm": 1.2,
+    "nose_length_mm": 3.2,
+    "nose_protrusion_mm": 2.4,
+    "nose_width_mm": 2.8,
+    "mouth_width_mm": 3.2,
+    "lip_mm": 0.8,
+    "ear_length_mm": 4.0,
+    "ear_protrusion_mm": 3.0,
+    "neck_width_mm": 7.0,
+}
 """Standard deviations for a population: of the size that anthropometric surveys give for adults."""
 
 

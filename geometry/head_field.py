@@ -80,7 +80,9 @@ def _face(p: Floats, m: Measures) -> Floats:
 
 
 def _neck(p: Floats, m: Measures) -> Floats:
-    column = round_cone(p, (0.0, 14.0, -45.0), (0.0, 30.0, -240.0), m.neck_radius, m.neck_radius + 4.0)
+    column = round_cone(
+        p, (0.0, 14.0, -45.0), (0.0, 30.0, -240.0), m.neck_radius, m.neck_radius + 4.0
+    )
     muscle = round_cone(p, (46.0, 14.0, -50.0), (14.0, -26.0, -170.0), 12.0, 11.0)
     return union(column, muscle, 16.0)
 

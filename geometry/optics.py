@@ -25,7 +25,7 @@ def blur_ratio(
 def depth_of_field_mm(
     focus_distance_mm: float, focal_length_mm: float, f_number: float, circle_of_confusion_mm: float
 ) -> tuple[float, float]:
-    """Near and far limit of acceptable sharpness; far is infinite beyond the hyperfocal distance."""
+    """Near and far limit of sharpness; far is infinite beyond the hyperfocal distance."""
     k = blur_ratio(focus_distance_mm, focal_length_mm, f_number, circle_of_confusion_mm)
     near = focus_distance_mm / (1.0 + k)
     far = focus_distance_mm / (1.0 - k) if k < 1.0 else np.inf

@@ -35,9 +35,13 @@ class SubjectOptions:
 
     def __post_init__(self) -> None:
         if self.region not in ("face", "all", "targets"):
-            raise InputError("region", f"region {self.region!r} is not known", "give face, all or targets")
+            raise InputError(
+                "region", f"region {self.region!r} is not known", "give face, all or targets"
+            )
         if min(self.design_count, self.check_count) < 4:
-            raise InputError("point-count", "fewer than 4 points are asked for", "ask for at least 4")
+            raise InputError(
+                "point-count", "fewer than 4 points are asked for", "ask for at least 4"
+            )
         if self.box is not None and self.sphere is not None:
             raise InputError("region", "a box and a sphere are both given", "give one of them")
 
@@ -61,14 +65,18 @@ def prepare_subject(scan: Scan, options: SubjectOptions | None = None) -> Prepar
     if chosen.region == "targets":
         points = SurfacePoints(scan.vertices_mm, scan.normals)
         note = ScanNote("inferred", f"{len(points)} targets, taken as they are")
-        return PreparedSubject(Subject(points, points, Occluder.none()), None, scan, (*scan.notes, note))
+        return PreparedSubject(
+            Subject(points, points, Occluder.none()), None, scan, (*scan.notes, note)
+        )
     count = int(_SAMPLES_PER_POINT * max(chosen.design_count, chosen.check_count) / _REGION_SHARE)
     samples = surface_samples(scan, count, chosen.seed)
     region, points, notes = _region(scan, samples, chosen)
     design_voxel = voxel_size_for(points, chosen.design_count)
     check_voxel = voxel_size_for(points, chosen.check_count)
     subject = Subject(
-        voxel_downsample(points, design_voxel), voxel_downsample(points, check_voxel), scan.occluder()
+        voxel_downsample(points, design_voxel),
+        voxel_downsample(points, check_voxel),
+        scan.occluder(),
     )
     text = (
         f"{len(subject.design_points)} design points from voxels of {design_voxel:.1f} mm, "
@@ -85,8 +93,9 @@ def _region(
         inside = given.holds(samples.points_mm)
         if not inside.any():
             raise InputError(
-                "region-empty", "the given region holds nothing of the scan",
-                f"the scan reaches from {_corner(scan, 0)} to {_corner(scan, 1)} mm in the rig frame",
+                "region-empty",
+                "the given region holds nothing of the scan",
+                f"the scan reaches from {_corner(scan, 0)} to {_corner(scan, 1)} mm",
             )
         return None, samples.subset(inside), (ScanNote("inferred", "region as given"),)
     if options.region == "all":
@@ -94,8 +103,8 @@ def _region(
     region, points = find_face(scan, samples)
     x, y, z = region.nose_tip_mm
     text = (
-        f"face found: nose tip at ({x:.0f}, {y:.0f}, {z:.0f}) mm, within {region.radius_mm:g} mm of it; "
-        f"{region.excluded_share:.1%} of it cannot be seen well from the front and is left out"
+        f"face found: nose tip at ({x:.0f}, {y:.0f}, {z:.0f}) mm, within {region.radius_mm:g} mm "
+        f"of it; {region.excluded_share:.1%} of it is hard to see from the front and left out"
     )
     return region, points, (ScanNote("inferred", text),)
 

@@ -1,6 +1,8 @@
-"""Ray casting on the scan: which lines of sight are free?"""
+"""Ray casting on the scan: lines of sight that are free, and what blocks the others."""
 
 from __future__ import annotations
+
+from typing import cast
 
 import numpy as np
 
@@ -38,13 +40,13 @@ class Occluder:
         scene = rtcore_scene.EmbreeScene(robust=True)
         local = (self.vertices_mm - self._origin).astype(np.float32)
         TriangleMesh(scene=scene, vertices=local, indices=self.faces.astype(np.int32))
-        return scene
+        return cast("object", scene)
 
     def __getstate__(self) -> dict[str, object]:
         return {"vertices_mm": self.vertices_mm, "faces": self.faces, "lift_mm": self.lift_mm}
 
     def __setstate__(self, state: dict[str, object]) -> None:
-        self.__init__(state["vertices_mm"], state["faces"], state["lift_mm"])  # type: ignore[misc,arg-type]
+        self.__init__(state["vertices_mm"], state["faces"], state["lift_mm"])  # type: ignore[misc]
 
     def first_hits(self, origins_mm: Floats, directions: Floats) -> tuple[Ints, Floats]:
         """First triangle hit by each ray, (N,), -1 for none, and the distance to it, (N,), mm.
@@ -73,4 +75,6 @@ class Occluder:
         """Unit normals (N, 3) of the given triangles."""
         a, b, c = (self.vertices_mm[self.faces[triangles, k]] for k in range(3))
         normals = np.cross(b - a, c - a)
-        return np.asarray(normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300))
+        return np.asarray(
+            normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+        )

@@ -59,9 +59,15 @@ def voxel_downsample(points: SurfacePoints, voxel_mm: float) -> SurfacePoints:
     """
     number, count = _voxels(points.points_mm, voxel_mm)
     share = np.bincount(number, minlength=count)[:, None]
-    mean = np.stack([np.bincount(number, points.points_mm[:, k], count) for k in range(3)], axis=1) / share
-    normal = np.stack([np.bincount(number, points.normals[:, k], count) for k in range(3)], axis=1) / share
-    nearest = cKDTree(points.points_mm).query(mean)[1]
+    mean = (
+        np.stack([np.bincount(number, points.points_mm[:, k], count) for k in range(3)], axis=1)
+        / share
+    )
+    normal = (
+        np.stack([np.bincount(number, points.normals[:, k], count) for k in range(3)], axis=1)
+        / share
+    )
+    nearest = np.asarray(cKDTree(points.points_mm).query(mean)[1])
     weak = np.linalg.norm(normal, axis=1) < 0.1
     normal[weak] = points.normals[nearest[weak]]
     return SurfacePoints(points.points_mm[nearest], normal)

@@ -96,5 +96,3 @@ def vertex_normals(vertices: Floats, faces: Ints) -> Floats:
     length = np.linalg.norm(total, axis=1, keepdims=True)
     # A vertex whose faces cancel out has no direction of its own; any unit vector will do there.
     return np.where(length > 1e-30, total / np.maximum(length, 1e-30), np.array([0.0, 0.0, 1.0]))
-
-

@@ -20,12 +20,20 @@ class SurfacePoints:
     def __post_init__(self) -> None:
         points, normals = np.array(self.points_mm, float), np.array(self.normals, float)
         if points.ndim != 2 or points.shape[1:] != (3,) or points.shape != normals.shape:
-            raise InputError("points-shape", "points and normals must both be N x 3", "give one normal per point")
+            raise InputError(
+                "points-shape", "points and normals must both be N x 3", "give one normal per point"
+            )
         if len(points) == 0:
-            raise InputError("points-empty", "there are no points to photograph", "choose a larger face region")
+            raise InputError(
+                "points-empty", "there are no points to photograph", "choose a larger face region"
+            )
         lengths = np.linalg.norm(normals, axis=1, keepdims=True)
         if not (np.isfinite(points).all() and np.isfinite(lengths).all() and (lengths > 0).all()):
-            raise InputError("points-not-finite", "points or normals are NaN, infinite or zero", "clean the scan first")
+            raise InputError(
+                "points-not-finite",
+                "points or normals are NaN, infinite or zero",
+                "clean the scan first",
+            )
         object.__setattr__(self, "points_mm", frozen(points))
         object.__setattr__(self, "normals", frozen(normals / lengths))
 

@@ -23,8 +23,12 @@ _COARSE = 4
 _MAX_PASSES = 50
 
 _CORNERS = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
-_EDGES = [(a, b) for a in range(8) for b in range(a + 1, 8)
-          if np.abs(_CORNERS[a] - _CORNERS[b]).sum() == 1]
+_EDGES = [
+    (a, b)
+    for a in range(8)
+    for b in range(a + 1, 8)
+    if np.abs(_CORNERS[a] - _CORNERS[b]).sum() == 1
+]
 
 
 def grid_values(field: Field, axes: tuple[Floats, Floats, Floats]) -> Floats:
@@ -38,8 +42,10 @@ def grid_values(field: Field, axes: tuple[Floats, Floats, Floats]) -> Floats:
     picks = [np.unique(np.append(np.arange(0, n, _COARSE), n - 1)) for n in shape]
     coarse = field(_nodes([a[p] for a, p in zip(axes, picks, strict=True)]))
     coarse = coarse.reshape([len(p) for p in picks])
-    nearest = [np.clip(np.rint(np.arange(n) / _COARSE).astype(int), 0, len(p) - 1)
-               for n, p in zip(shape, picks, strict=True)]
+    nearest = [
+        np.clip(np.rint(np.arange(n) / _COARSE).astype(int), 0, len(p) - 1)
+        for n, p in zip(shape, picks, strict=True)
+    ]
     values = coarse[np.ix_(*nearest)]
     # A node is at most half a coarse cell's diagonal from the coarse node that stands for it;
     # twice that covers the error of first-order distances.
@@ -101,7 +107,7 @@ def surface_nets(values: Floats, axes: tuple[Floats, Floats, Floats]) -> tuple[F
     inside = values < 0.0
     cell_shape = tuple(n - 1 for n in values.shape)
     corners = [values[_window(c, cell_shape)] for c in _CORNERS]
-    count = sum((c < 0.0).astype(np.int8) for c in corners)
+    count = np.sum([c < 0.0 for c in corners], axis=0, dtype=np.int8)
     cells = np.flatnonzero(((count > 0) & (count < 8)).ravel())
     vertices = _cell_vertices(corners, cells, cell_shape, axes)
     number = np.full(int(np.prod(cell_shape)), -1, dtype=np.int64)
@@ -172,9 +178,7 @@ def settle(vertices: Floats, field: Field, steps: int = 2, reach: float = 0.5) -
     h = 1e-3
     for _ in range(steps):
         value = field(moved)
-        gradient = np.stack(
-            [(field(moved + h * e) - value) / h for e in np.eye(3)], axis=1
-        )
+        gradient = np.stack([(field(moved + h * e) - value) / h for e in np.eye(3)], axis=1)
         square = np.maximum(np.einsum("ij,ij->i", gradient, gradient), 1e-3)
         move = -(value / square)[:, None] * gradient
         length = np.linalg.norm(move, axis=1, keepdims=True)

@@ -19,7 +19,10 @@ def sphere_cover(body: Body) -> tuple[Floats, Floats]:
     """
     counts = np.maximum(1, np.ceil(body.size_mm / _CELL_MM).astype(int))
     cell = body.size_mm / counts
-    steps = [(np.arange(n) + 0.5) * c - s / 2.0 for n, c, s in zip(counts, cell, body.size_mm, strict=True)]
+    steps = [
+        (np.arange(n) + 0.5) * c - s / 2.0
+        for n, c, s in zip(counts, cell, body.size_mm, strict=True)
+    ]
     grid = np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1).reshape(-1, 3)
     centres = [grid + body.centre_camera_mm]
     radii = [np.full(len(grid), float(np.linalg.norm(cell)) / 2.0)]

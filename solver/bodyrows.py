@@ -42,7 +42,14 @@ def _planes(family: str, scene: Scene, i: int, normals: Floats, offsets_mm: Floa
     low = shifted[plane] + np.tile(radius, count)
     camera = np.full(len(low), i)
     block = BodyPlanes(
-        family, "mm", scene.length_mm, low, bound(_INF, low), camera, np.tile(offset, (count, 1)), normals[plane]
+        family,
+        "mm",
+        scene.length_mm,
+        low,
+        bound(_INF, low),
+        camera,
+        np.tile(offset, (count, 1)),
+        normals[plane],
     )
     return Candidates(block, plane, _KEEP)
 
@@ -111,9 +118,16 @@ def _collisions(scene: Scene, state: NetworkState) -> list[Candidates]:
     one, two = one[apart], two[apart]
     low = radius[one] + radius[two] + clearance / scene.length_mm
     block: Block = BodyPairs(
-        "body_clearance", "mm", scene.length_mm, low, bound(_INF, low),
-        camera[one], camera[two], offset[one], offset[two],
-    )  # fmt: skip
+        "body_clearance",
+        "mm",
+        scene.length_mm,
+        low,
+        bound(_INF, low),
+        camera[one],
+        camera[two],
+        offset[one],
+        offset[two],
+    )
     # Bodies far apart now are watched by the check after each solve, not row by row.
     near = np.flatnonzero(block.slack(state) < 0.5)
     block = block.take(near)
@@ -142,9 +156,16 @@ def _sight_lines(scene: Scene, state: NetworkState) -> list[Candidates]:
     looks, rows = np.concatenate([p[0] for p in parts]), np.concatenate([p[1] for p in parts])
     low = radius[rows] + clearance / scene.length_mm
     block = SightPlanes(
-        "sight_line", "mm", scene.length_mm, low, bound(_INF, low),
-        looks, camera[rows], offset[rows], np.concatenate([p[2] for p in parts]),
-    )  # fmt: skip
+        "sight_line",
+        "mm",
+        scene.length_mm,
+        low,
+        bound(_INF, low),
+        looks,
+        camera[rows],
+        offset[rows],
+        np.concatenate([p[2] for p in parts]),
+    )
     return [Candidates(block, grouped(looks, camera[rows]), 1)]
 
 

@@ -30,7 +30,13 @@ BINDING = 1e-3
 
 
 def row(
-    name: str, value: float, limit: float, sense: Sense, unit: str, scale: float, tolerance: float = 0.0
+    name: str,
+    value: float,
+    limit: float,
+    sense: Sense,
+    unit: str,
+    scale: float,
+    tolerance: float = 0.0,
 ) -> ConstraintRow:
     """One line of the table; ``scale`` is the size against which slack is judged."""
     slack = {
@@ -42,7 +48,9 @@ def row(
     # An equality binds by its nature.
     active = sense is Sense.EQUAL or slack < BINDING * size
     met = slack >= -SATISFIED * size
-    return ConstraintRow(name, float(value), float(limit), sense, unit, float(slack), bool(active), bool(met))
+    return ConstraintRow(
+        name, float(value), float(limit), sense, unit, float(slack), bool(active), bool(met)
+    )
 
 
 def constraint_table(
@@ -71,7 +79,12 @@ def _of_camera(scene: Scene, camera: RigCamera, seen: Bools) -> Iterator[Constra
     if limits.depth_of_field:
         nearest = kind.min_focus_distance_mm
         yield row(
-            f"min_focus/{camera.name}", camera.focus_distance_mm, nearest, Sense.AT_LEAST, "mm", nearest
+            f"min_focus/{camera.name}",
+            camera.focus_distance_mm,
+            nearest,
+            Sense.AT_LEAST,
+            "mm",
+            nearest,
         )
     if not seen.any():
         return
@@ -82,24 +95,37 @@ def _of_camera(scene: Scene, camera: RigCamera, seen: Bools) -> Iterator[Constra
         w, h = kind.image_size_px
         border = np.minimum(pixels + 0.5, np.array([w, h]) - 0.5 - pixels)
         value = float(np.where(depth > 0.0, border.min(axis=1), -np.inf).min())
-        yield row(f"frame/{camera.name}", value, limits.frame.margin_px, Sense.AT_LEAST, "px", float(w))
+        yield row(
+            f"frame/{camera.name}", value, limits.frame.margin_px, Sense.AT_LEAST, "px", float(w)
+        )
     if limits.depth_of_field:
         value = _largest_blur(camera, depth)
         limit = kind.circle_of_confusion_mm
         yield row(f"depth_of_field/{camera.name}", value, limit, Sense.AT_MOST, "mm", limit)
     else:
         nearest = kind.min_focus_distance_mm
-        yield row(f"min_focus/{camera.name}", float(depth.min()), nearest, Sense.AT_LEAST, "mm", scene.length_mm)
+        yield row(
+            f"min_focus/{camera.name}",
+            float(depth.min()),
+            nearest,
+            Sense.AT_LEAST,
+            "mm",
+            scene.length_mm,
+        )
     if limits.gsd_max_mm is not None:
         value = float(depth.max()) / kind.focal_length_px
-        yield row(f"gsd/{camera.name}", value, limits.gsd_max_mm, Sense.AT_MOST, "mm", limits.gsd_max_mm)
+        yield row(
+            f"gsd/{camera.name}", value, limits.gsd_max_mm, Sense.AT_MOST, "mm", limits.gsd_max_mm
+        )
 
 
 def _largest_blur(camera: RigCamera, depth: Floats) -> float:
     kind = camera.camera
     if (depth <= 0.0).any():
         return float("inf")
-    return float(blur_disk_mm(depth, camera.focus_distance_mm, kind.focal_length_mm, kind.f_number).max())
+    return float(
+        blur_disk_mm(depth, camera.focus_distance_mm, kind.focal_length_mm, kind.f_number).max()
+    )
 
 
 def _means(scene: Scene) -> Iterator[ConstraintRow]:
@@ -135,9 +161,11 @@ def _of_block(scene: Scene, candidates: Candidates) -> Iterator[ConstraintRow]:
     value = block.value(state)
     slack = np.minimum(value - block.lower, block.upper - value)
     if isinstance(block, WeightedSum):
-        subjects = [(-1,)] * block.rows
+        subjects: list[tuple[int, ...]] = [(-1,)] * block.rows
     else:
-        subjects = [tuple(dict.fromkeys(int(c) // PER_CAMERA for c in line)) for line in block.columns]
+        subjects = [
+            tuple(dict.fromkeys(int(c) // PER_CAMERA for c in line)) for line in block.columns
+        ]
     worst: dict[tuple[int, ...], int] = {}
     for k, subject in enumerate(subjects):
         if subject not in worst or slack[k] < slack[worst[subject]]:
@@ -150,26 +178,40 @@ def _of_block(scene: Scene, candidates: Candidates) -> Iterator[ConstraintRow]:
         if np.isfinite(low) and np.isfinite(high):
             middle, tolerance = 0.5 * (low + high), 0.5 * (high - low)
             yield row(
-                f"{block.family}/{who}", value[k] * natural, middle * natural, Sense.EQUAL, block.unit,
-                natural, tolerance * natural,
-            )  # fmt: skip
+                f"{block.family}/{who}",
+                value[k] * natural,
+                middle * natural,
+                Sense.EQUAL,
+                block.unit,
+                natural,
+                tolerance * natural,
+            )
         else:
             sense = Sense.AT_LEAST if np.isfinite(low) else Sense.AT_MOST
             limit = low if np.isfinite(low) else high
             # Distances of covering spheres are told as clearances between them.
-            shift = limit - _CLEARANCES[block.family](scene) / natural if clearance else 0.0
+            shift = limit - _clearance(scene, block.family) / natural if clearance else 0.0
             yield row(
-                f"{block.family}/{who}", (value[k] - shift) * natural, (limit - shift) * natural, sense,
-                block.unit, natural,
-            )  # fmt: skip
+                f"{block.family}/{who}",
+                (value[k] - shift) * natural,
+                (limit - shift) * natural,
+                sense,
+                block.unit,
+                natural,
+            )
 
 
-_CLEARANCES = {
-    "body_clearance": lambda scene: scene.limits.body_clearance_mm or 0.0,
-    "sight_line": lambda scene: scene.limits.sight_line_clearance_mm or 0.0,
-    "zone_allowed": lambda _: 0.0,
-    "zone_forbidden": lambda _: 0.0,
-}
+_CLEARANCES = ("body_clearance", "sight_line", "zone_allowed", "zone_forbidden")
+
+
+def _clearance(scene: Scene, family: str) -> float:
+    """The clearance that the limit asks for between two solids, mm."""
+    limits = scene.limits
+    asked = {
+        "body_clearance": limits.body_clearance_mm,
+        "sight_line": limits.sight_line_clearance_mm,
+    }
+    return asked.get(family) or 0.0
 
 
 def _of_coverage(scene: Scene, coverage: tuple[CoverageShare, ...]) -> Iterator[ConstraintRow]:
@@ -189,8 +231,21 @@ def _of_bounds(scene: Scene) -> Iterator[ConstraintRow]:
         turned = (turned + 180.0) % 360.0 - 180.0
         moved = camera.pose.position_rig_mm - anchor.position_rig_mm
         for name, value, half, unit in (
-            *zip(("omega", "phi", "kappa"), turned, (box.omega_deg, box.phi_deg, box.kappa_deg), ["deg"] * 3, strict=True),
+            *zip(
+                ("omega", "phi", "kappa"),
+                turned,
+                (box.omega_deg, box.phi_deg, box.kappa_deg),
+                ["deg"] * 3,
+                strict=True,
+            ),
             *zip("xyz", moved, (box.x_mm, box.y_mm, box.z_mm), ["mm"] * 3, strict=True),
         ):
             if half is not None:
-                yield row(f"bound_{name}/{camera.name}", abs(float(value)), half, Sense.AT_MOST, unit, max(half, 1.0))
+                yield row(
+                    f"bound_{name}/{camera.name}",
+                    abs(float(value)),
+                    half,
+                    Sense.AT_MOST,
+                    unit,
+                    max(half, 1.0),
+                )

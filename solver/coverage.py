@@ -70,7 +70,9 @@ def views(scene: Scene, state: NetworkState, earlier: Views | None = None) -> Vi
     """
     source = scene.subject.design_points
     limit = scene.limits.incidence.ray_max_deg
-    found = sight(source, scene.subject.occluder, centres_mm(scene, state), limit, scene.visibility_positions)
+    found = sight(
+        source, scene.subject.occluder, centres_mm(scene, state), limit, scene.visibility_positions
+    )
     seen = found.seen
     for i, camera in enumerate(scene.cameras):
         if camera.fixed:
@@ -152,9 +154,16 @@ class Cuts:
         if len(self.camera) == 0:
             return []
         block = PlaceCones(
-            "coverage", "mm", scene.length_mm, bound(0.0, self.camera), bound(np.inf, self.camera),
-            self.camera, self.place, self.normal, bound(_HORIZON_MARGIN, self.camera),
-        )  # fmt: skip
+            "coverage",
+            "mm",
+            scene.length_mm,
+            bound(0.0, self.camera),
+            bound(np.inf, self.camera),
+            self.camera,
+            self.place,
+            self.normal,
+            bound(_HORIZON_MARGIN, self.camera),
+        )
         return [Candidates.all_of(block)]
 
 
@@ -172,7 +181,9 @@ def cuts_for_hidden(scene: Scene, state: NetworkState, promises: Promises, open_
         rows = np.flatnonzero(occluder.hidden(points, normals, local))
         if len(rows) == 0:
             continue
-        found = horizons(source, occluder, promises.point[rows], local[rows], open_mm[rows] @ position.turn)
+        found = horizons(
+            source, occluder, promises.point[rows], local[rows], open_mm[rows] @ position.turn
+        )
         place = scene.scaled(position.points(found.point_mm))
         normal = position.directions(found.normal)
         cuts = cuts.joined(Cuts(promises.camera[rows], promises.point[rows], place, normal))
@@ -181,7 +192,9 @@ def cuts_for_hidden(scene: Scene, state: NetworkState, promises: Promises, open_
 
 def _in_head(position: HeadPosition, eyes_mm: Floats) -> Floats:
     """Eyes (m, 3) as seen by somebody fixed to the moved head."""
-    return np.asarray((eyes_mm - position.pivot_mm - position.shift_mm) @ position.turn + position.pivot_mm)
+    return np.asarray(
+        (eyes_mm - position.pivot_mm - position.shift_mm) @ position.turn + position.pivot_mm
+    )
 
 
 def opening_directions(scene: Scene, state: NetworkState, promises: Promises) -> Floats:

@@ -45,18 +45,31 @@ class Order:
         views = max((t.views for t in self.limits.coverage.tiers), default=1)
         given = None if self.start is None else len(self.start)
         problems = (
-            (self.count < 1, "no-cameras", f"{self.count} cameras are to be placed", "ask for at least one"),
-            (self.starts < 1, "starts", f"{self.starts} starts are asked for", "ask for at least one start"),
             (
-                views > total, "limits-contradict",
-                f"coverage asks for {views} views of each point, but there are only {total} cameras",
+                self.count < 1,
+                "no-cameras",
+                f"{self.count} cameras are to be placed",
+                "ask for at least one",
+            ),
+            (
+                self.starts < 1,
+                "starts",
+                f"{self.starts} starts are asked for",
+                "ask for at least one start",
+            ),
+            (
+                views > total,
+                "limits-contradict",
+                f"coverage asks for {views} views of each point, but there are {total} cameras",
                 "ask for fewer views or more cameras",
             ),
             (
-                given is not None and given != self.count, "start-count",
-                f"{given} start poses are given for {self.count} cameras", "give one start pose per camera",
+                given is not None and given != self.count,
+                "start-count",
+                f"{given} start poses are given for {self.count} cameras",
+                "give one start pose per camera",
             ),
-        )  # fmt: skip
+        )
         for wrong, detail, problem, remedy in problems:
             if wrong:
                 raise InputError(detail, problem, remedy)
@@ -174,7 +187,13 @@ def _jobs(order: Order) -> list[StartJob]:
         jobs.append(StartJob(len(jobs), kind, order.scene(cameras), order.seed))
 
     if order.start is not None:
-        add("given", tuple(camera_at(camera, n, p, _target(subject)) for n, p in zip(names, order.start, strict=True)))
+        add(
+            "given",
+            tuple(
+                camera_at(camera, n, p, _target(subject))
+                for n, p in zip(names, order.start, strict=True)
+            ),
+        )
         while len(jobs) < order.starts:
             add("given, jittered", _jittered(order, len(jobs)))
         return jobs
@@ -183,7 +202,10 @@ def _jobs(order: Order) -> list[StartJob]:
         add("strip", best_strip(subject, camera, limits, names))
     while len(jobs) < order.starts:
         index = len(jobs)
-        add("k-means, jittered", kmeans_start(subject, camera, limits, names, order.seed + 1000 * index, 1.0))
+        add(
+            "k-means, jittered",
+            kmeans_start(subject, camera, limits, names, order.seed + 1000 * index, 1.0),
+        )
     return jobs
 
 
@@ -199,7 +221,14 @@ def _jittered(order: Order, index: int) -> tuple[RigCamera, ...]:
         distance = float(np.linalg.norm(pose.position_rig_mm - _target(order.subject)))
         position = pose.position_rig_mm + 0.1 * distance * rng.normal(size=3)
         angles = pose.omega_phi_kappa_deg + 6.0 * rng.normal(size=3)
-        out.append(camera_at(order.camera, name, Pose.from_omega_phi_kappa(position, angles), _target(order.subject)))
+        out.append(
+            camera_at(
+                order.camera,
+                name,
+                Pose.from_omega_phi_kappa(position, angles),
+                _target(order.subject),
+            )
+        )
     return tuple(out)
 
 

@@ -10,7 +10,8 @@ from solver.progress import CancelToken
 from solver.result import Concession
 from solver.rounds import SATISFIED, all_candidates, covariance_cost, unknown_bounds
 from solver.scene import Scene
-from solver.sqp import Outcome, Task, minimise
+from solver.sqp import Outcome, minimise
+from solver.sqpstate import Task
 
 _HARD = 1000.0
 """How much dearer a breach of the other families is, when one alone is asked to give way."""
@@ -41,7 +42,12 @@ def conflicts(scene: Scene, values: Floats, cancel: CancelToken) -> tuple[Conces
     for name in _taking_part(task, nearest, breaches):
         unit, natural = _unit(task, name)
         alone = Task(
-            scene.unknowns, cost, rows, bounds, ("coverage",), weights={f: _HARD for f in task.families if f != name}
+            scene.unknowns,
+            cost,
+            rows,
+            bounds,
+            ("coverage",),
+            weights={f: _HARD for f in task.families if f != name},
         )
         found = minimise(alone, nearest.values, watch, max_iterations=_MAX_STEPS, price=100.0)
         left = alone.breaches(found.values)
@@ -79,5 +85,3 @@ def _coverage(scene: Scene, values: Floats) -> list[Concession]:
         if missing > 0.0:
             out.append(Concession(f"coverage_{tier.views}", "", missing, missing))
     return out
-
-

@@ -47,7 +47,9 @@ class _Rays:
 
     def part(self, points: slice) -> _Rays:
         """The rays of some of the points."""
-        return _Rays(self.d[:, :, points], self.z[:, points], self.rr[:, points], self.weight[:, points])
+        return _Rays(
+            self.d[:, :, points], self.z[:, points], self.rr[:, points], self.weight[:, points]
+        )
 
 
 def _rays(state: NetworkState, points: Floats, weight: Floats) -> _Rays:

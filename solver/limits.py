@@ -81,7 +81,9 @@ class BaseHeight:
 
 @dataclass(frozen=True)
 class Incidence:
-    """Eq 10. ``ray_max_deg``: a point counts as seen only up to this angle between its normal
+    """Eq 10: angles of incidence.
+
+    ``ray_max_deg``: a point counts as seen only up to this angle between its normal
     and the ray to the camera. ``mean_max_deg``: limit for each camera's mean angle between its
     optical axis and the normals of the points (the figure in the paper's Table 2).
     """
@@ -140,10 +142,15 @@ class Symmetry:
     balance_tolerance_mm: float | None = None
 
     def __post_init__(self) -> None:
-        _non_negative("symmetry", median_tolerance_mm=self.median_tolerance_mm,
-                      balance_tolerance_mm=self.balance_tolerance_mm)
+        _non_negative(
+            "symmetry",
+            median_tolerance_mm=self.median_tolerance_mm,
+            balance_tolerance_mm=self.balance_tolerance_mm,
+        )
         if not self.axes or set(self.axes) - set("xyz") or len(set(self.axes)) != len(self.axes):
-            raise _bad(f"symmetry.axes is {self.axes!r}", "name each axis once, for example 'x' or 'xz'")
+            raise _bad(
+                f"symmetry.axes is {self.axes!r}", "name each axis once, for example 'x' or 'xz'"
+            )
 
     @property
     def axis_indices(self) -> tuple[int, ...]:
@@ -160,8 +167,10 @@ class CoverageTier:
 
     def __post_init__(self) -> None:
         if self.views < 1 or not 0.0 < self.share <= 1.0:
-            raise _bad(f"coverage asks for {self.share} of the points in {self.views} views",
-                       "give views >= 1 and 0 < share <= 1")
+            raise _bad(
+                f"coverage asks for {self.share} of the points in {self.views} views",
+                "give views >= 1 and 0 < share <= 1",
+            )
 
 
 @dataclass(frozen=True)
@@ -177,7 +186,9 @@ class Coverage:
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.unseen_sigma_mm) and self.unseen_sigma_mm > 0.0):
-            raise _bad(f"coverage.unseen_sigma_mm is {self.unseen_sigma_mm}", "give a positive length")
+            raise _bad(
+                f"coverage.unseen_sigma_mm is {self.unseen_sigma_mm}", "give a positive length"
+            )
 
 
 @dataclass(frozen=True)
@@ -202,7 +213,10 @@ class Box:
     def __post_init__(self) -> None:
         low, high = frozen(self.low_mm), frozen(self.high_mm)
         if low.shape != (3,) or high.shape != (3,) or not (low < high).all():
-            raise _bad("a zone's box does not have low < high in x, y and z", "give two corners of 3 numbers")
+            raise _bad(
+                "a zone's box does not have low < high in x, y and z",
+                "give two corners of 3 numbers",
+            )
         object.__setattr__(self, "low_mm", low)
         object.__setattr__(self, "high_mm", high)
 
@@ -217,7 +231,9 @@ class Sphere:
     def __post_init__(self) -> None:
         centre = frozen(self.centre_mm)
         if centre.shape != (3,) or not np.isfinite(centre).all() or not self.radius_mm > 0.0:
-            raise _bad("a zone's sphere is malformed", "give a centre of 3 numbers and a positive radius")
+            raise _bad(
+                "a zone's sphere is malformed", "give a centre of 3 numbers and a positive radius"
+            )
         object.__setattr__(self, "centre_mm", centre)
 
 
@@ -231,8 +247,16 @@ class HalfSpace:
     def __post_init__(self) -> None:
         normal = np.array(self.normal, dtype=np.float64)
         length = float(np.linalg.norm(normal))
-        if normal.shape != (3,) or not np.isfinite(length) or length == 0.0 or not np.isfinite(self.offset_mm):
-            raise _bad("a zone's plane is malformed", "give a normal of 3 numbers, not all zero, and an offset")
+        if (
+            normal.shape != (3,)
+            or not np.isfinite(length)
+            or length == 0.0
+            or not np.isfinite(self.offset_mm)
+        ):
+            raise _bad(
+                "a zone's plane is malformed",
+                "give a normal of 3 numbers, not all zero, and an offset",
+            )
         object.__setattr__(self, "normal", frozen(normal / length))
 
 
@@ -241,8 +265,11 @@ Zone = Box | Sphere | HalfSpace
 
 @dataclass(frozen=True)
 class Zones:
-    """Where cameras may stand. A body lies wholly inside one of ``allowed`` (when any are given)
-    and wholly outside each of ``forbidden``."""
+    """Where cameras may stand.
+
+    A body lies wholly inside one of ``allowed`` (when any are given) and wholly outside each of
+    ``forbidden``.
+    """
 
     allowed: tuple[Zone, ...] = ()
     forbidden: tuple[Zone, ...] = ()
@@ -290,7 +317,13 @@ class Limits:
     motion: MotionBox | None = None
 
     def __post_init__(self) -> None:
-        _non_negative("limits", gsd_max_mm=self.gsd_max_mm, body_clearance_mm=self.body_clearance_mm,
-                      sight_line_clearance_mm=self.sight_line_clearance_mm)
+        _non_negative(
+            "limits",
+            gsd_max_mm=self.gsd_max_mm,
+            body_clearance_mm=self.body_clearance_mm,
+            sight_line_clearance_mm=self.sight_line_clearance_mm,
+        )
         if not (np.isfinite(self.image_sigma_px) and self.image_sigma_px > 0.0):
-            raise _bad(f"image_sigma_px is {self.image_sigma_px}", "give a positive number of pixels")
+            raise _bad(
+                f"image_sigma_px is {self.image_sigma_px}", "give a positive number of pixels"
+            )

@@ -13,9 +13,7 @@ from solver.limits import MotionBox
 
 # Eight of the 64 corners of the box of six freedoms, in which every pair of freedoms meets in
 # all four sign combinations: enough for visibility, which changes slowly with each of them.
-_CORNERS = np.array([
-    (x, y, z, x * y, x * z, y * z) for x, y, z in product((-1.0, 1.0), repeat=3)
-])
+_CORNERS = np.array([(x, y, z, x * y, x * z, y * z) for x, y, z in product((-1.0, 1.0), repeat=3)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,5 +65,7 @@ def framing_positions(box: MotionBox | None, pivot_mm: Floats) -> tuple[HeadPosi
     if box is None:
         return (rest(pivot_mm),)
     shifts = [(-1.0, 1.0) if h > 0.0 else (0.0,) for h in (box.x_mm, box.y_mm, box.z_mm)]
-    turns = [(-1.0, 0.0, 1.0) if h > 0.0 else (0.0,) for h in (box.pitch_deg, box.roll_deg, box.yaw_deg)]
+    turns = [
+        (-1.0, 0.0, 1.0) if h > 0.0 else (0.0,) for h in (box.pitch_deg, box.roll_deg, box.yaw_deg)
+    ]
     return tuple(_position(box, np.array(signs), pivot_mm) for signs in product(*shifts, *turns))

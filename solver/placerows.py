@@ -60,7 +60,9 @@ def _base_height(scene: Scene, state: NetworkState) -> list[Candidates]:
 
     def ratios(family: str, one: Ints, two: Ints, low: float, high: float) -> BaseHeightRatio:
         centroid = np.zeros((len(one), 3))
-        return BaseHeightRatio(family, "", 1.0, bound(low, one), bound(high, one), one, two, centroid)
+        return BaseHeightRatio(
+            family, "", 1.0, bound(low, one), bound(high, one), one, two, centroid
+        )
 
     if len(first) == 0:
         return []
@@ -85,10 +87,24 @@ def _base_height(scene: Scene, state: NetworkState) -> list[Candidates]:
 
 
 def _sum(
-    scene: Scene, family: str, unit: str, natural: float, low: float, high: float, inner: Block, weights: Floats
+    scene: Scene,
+    family: str,
+    unit: str,
+    natural: float,
+    low: float,
+    high: float,
+    inner: Block,
+    weights: Floats,
 ) -> WeightedSum:
     return WeightedSum(
-        family, unit, natural, np.array([low]), np.array([high]), inner, weights, PER_CAMERA * scene.count
+        family,
+        unit,
+        natural,
+        np.array([low]),
+        np.array([high]),
+        inner,
+        weights,
+        PER_CAMERA * scene.count,
     )
 
 
@@ -98,12 +114,15 @@ def _stand_off(scene: Scene) -> list[Candidates]:
     origin = np.zeros((scene.count, 3))
     out = []
     for family, low, high in (
-        ("stand_off_min", limit.min_mm, None), ("stand_off_max", None, limit.max_mm)
-    ):  # fmt: skip
+        ("stand_off_min", limit.min_mm, None),
+        ("stand_off_max", None, limit.max_mm),
+    ):
         if low is None and high is None:
             continue
         lower, upper = _or(low, -_INF) / scale, _or(high, _INF) / scale
-        block = PlaceDistance(family, "mm", scale, bound(lower, every), bound(upper, every), every, origin)
+        block = PlaceDistance(
+            family, "mm", scale, bound(lower, every), bound(upper, every), every, origin
+        )
         out.append(Candidates.all_of(block))
     return out
 
@@ -113,8 +132,13 @@ def _spacing(scene: Scene, state: NetworkState) -> list[Candidates]:
     if limit is None or scene.count < 2:
         return []
     first, second = delaunay_edges(state.centre)
-    inner = BaseLength("spacing", "mm", scale, bound(-_INF, first), bound(_INF, first), first, second)
-    low, high = (limit.edge_mm - limit.tolerance_mm) / scale, (limit.edge_mm + limit.tolerance_mm) / scale
+    inner = BaseLength(
+        "spacing", "mm", scale, bound(-_INF, first), bound(_INF, first), first, second
+    )
+    low, high = (
+        (limit.edge_mm - limit.tolerance_mm) / scale,
+        (limit.edge_mm + limit.tolerance_mm) / scale,
+    )
     weights = np.full((1, len(first)), 1.0 / len(first))
     return [Candidates.all_of(_sum(scene, "spacing", "mm", scale, low, high, inner, weights))]
 
@@ -138,15 +162,25 @@ def _symmetry(scene: Scene, state: NetworkState) -> list[Candidates]:
         name = "xyz"[axis]
         mean = np.full(n, 1.0 / n)
         for family, tolerance, weights in (
-            (f"symmetry_median_{name}", limit.median_tolerance_mm, mean - median_weights(state.centre[:, axis])),
+            (
+                f"symmetry_median_{name}",
+                limit.median_tolerance_mm,
+                mean - median_weights(state.centre[:, axis]),
+            ),
             (f"symmetry_balance_{name}", limit.balance_tolerance_mm, mean),
         ):
             if tolerance is None:
                 continue
             inner = PlaceCoordinate(
-                family, "mm", scale, bound(-_INF, every), bound(_INF, every),
-                every, np.full(n, axis), np.zeros(n),
-            )  # fmt: skip
+                family,
+                "mm",
+                scale,
+                bound(-_INF, every),
+                bound(_INF, every),
+                every,
+                np.full(n, axis),
+                np.zeros(n),
+            )
             band = tolerance / scale
             row = _sum(scene, family, "mm", scale, -band, band, inner, weights[None])
             out.append(Candidates.all_of(row))
@@ -155,4 +189,9 @@ def _symmetry(scene: Scene, state: NetworkState) -> list[Candidates]:
 
 def place_rows(scene: Scene, state: NetworkState) -> list[Candidates]:
     """All candidate rows about places."""
-    return _stand_off(scene) + _base_height(scene, state) + _spacing(scene, state) + _symmetry(scene, state)
+    return (
+        _stand_off(scene)
+        + _base_height(scene, state)
+        + _spacing(scene, state)
+        + _symmetry(scene, state)
+    )

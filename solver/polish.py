@@ -9,7 +9,8 @@ from solver.coverage import Cuts, cuts_for_hidden, opening_directions, views
 from solver.progress import CancelToken
 from solver.rounds import all_candidates, covariance_cost, unknown_bounds
 from solver.scene import Scene
-from solver.sqp import Outcome, Task, minimise
+from solver.sqp import Outcome, minimise
+from solver.sqpstate import Task
 
 _RADIUS = 0.02
 _MAX_STEPS = 120
@@ -30,9 +31,15 @@ def polish(scene: Scene, values: Floats, cancel: CancelToken) -> Outcome:
         for _ in range(3):
             task = Task(scene.unknowns, cost, rows + cuts.rows(scene), bounds, ("coverage",))
             outcome = minimise(
-                task, found, lambda *_: not cancel.is_set(), tolerance=_TIGHT, gain_tolerance=1e-13,
-                known=known, max_iterations=_MAX_STEPS, radius=_RADIUS,
-            )  # fmt: skip
+                task,
+                found,
+                lambda *_: not cancel.is_set(),
+                tolerance=_TIGHT,
+                gain_tolerance=1e-13,
+                known=known,
+                max_iterations=_MAX_STEPS,
+                radius=_RADIUS,
+            )
             found, known = outcome.values, outcome.multipliers
             lost = cuts_for_hidden(scene, scene.unknowns.state(found), seen.promises, opening)
             if outcome.stopped or len(lost.camera) == 0:

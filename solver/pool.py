@@ -9,7 +9,10 @@ from collections.abc import Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
+from multiprocessing.process import BaseProcess
+from multiprocessing.queues import Queue
+from multiprocessing.synchronize import Event
+from typing import Protocol
 
 from threadpoolctl import threadpool_limits
 
@@ -32,7 +35,6 @@ class StartJob:
     seed: int
 
 
-
 @contextmanager
 def _single_threaded_children() -> Iterator[None]:
     """BLAS reads its thread count when it is loaded, so children must be born with it set."""
@@ -48,19 +50,21 @@ def _single_threaded_children() -> Iterator[None]:
                 os.environ[name] = value
 
 
-_channel: tuple[Any, Any] | None = None
+Step = tuple[int, int, int, float, float]
+
+_channel: tuple[Queue[Step], Event] | None = None
 
 
-def _begin(messages: Any, cancelled: Any) -> None:
+def _begin(messages: Queue[Step], cancelled: Event) -> None:
     """Set up a worker: its channel, and its end when its parent dies."""
-    global _channel  # noqa: PLW0603 - a pool's initializer has no other way to hand things over
+    global _channel  # a pool's initializer has no other way to hand things over
     _channel = (messages, cancelled)
     parent = mp.parent_process()
     if parent is not None:
         threading.Thread(target=_die_with, args=(parent,), daemon=True).start()
 
 
-def _die_with(parent: Any) -> None:
+def _die_with(parent: BaseProcess) -> None:
     parent.join()
     os._exit(1)
 
@@ -82,14 +86,18 @@ def _solve_in_worker(job: StartJob) -> StartResult:
     return solve(job, report, cancelled)
 
 
-class Listener:
+class Listener(Protocol):
     """Receives ``(start, round, iteration, cost, violation)`` of all starts."""
 
-    def __call__(self, start: int, round_: int, iteration: int, cost: float, breach: float) -> None:
+    def __call__(
+        self, start: int, round_: int, iteration: int, cost: float, breach: float, /
+    ) -> None:
         """Take note."""
 
 
-def run_all(jobs: list[StartJob], workers: int, listen: Listener, cancel: CancelToken) -> list[StartResult]:
+def run_all(
+    jobs: list[StartJob], workers: int, listen: Listener, cancel: CancelToken
+) -> list[StartResult]:
     """Results of all jobs in their order, whatever the number of workers.
 
     Raises :class:`CancelledError` when ``cancel`` is set before all are done.
@@ -97,7 +105,8 @@ def run_all(jobs: list[StartJob], workers: int, listen: Listener, cancel: Cancel
     if workers <= 1 or len(jobs) == 1:
         return _run_here(jobs, listen, cancel)
     context = mp.get_context("spawn")
-    messages, cancelled = context.Queue(), context.Event()
+    messages: Queue[Step] = context.Queue()
+    cancelled = context.Event()
     with _single_threaded_children():
         pool = ProcessPoolExecutor(min(workers, len(jobs)), context, _begin, (messages, cancelled))
         try:
@@ -120,7 +129,11 @@ def _run_here(jobs: list[StartJob], listen: Listener, cancel: CancelToken) -> li
 
 
 def _attend(
-    futures: list[Future[StartResult]], messages: Any, cancelled: Any, listen: Listener, cancel: CancelToken
+    futures: list[Future[StartResult]],
+    messages: Queue[Step],
+    cancelled: Event,
+    listen: Listener,
+    cancel: CancelToken,
 ) -> None:
     """Pass on progress until all are done or the work is cancelled."""
     pending = set(futures)

@@ -68,7 +68,7 @@ class Programme:
     def prices(self) -> Floats:
         """Price of each concession."""
         each = np.full(self.concession_count - len(self.soft), self.each_price)
-        return np.r_[np.array(self.soft_prices), each]
+        return np.concatenate([np.array(self.soft_prices), each])
 
     @cached_property
     def bounds(self) -> tuple[Floats, Floats]:
@@ -151,7 +151,7 @@ class Programme:
 
     def pack(self, values: Floats) -> Floats:
         """Variables of all unknowns (7 n,), with no concessions."""
-        return np.r_[values[self.free], np.zeros(self.concession_count)]
+        return np.concatenate([values[self.free], np.zeros(self.concession_count)])
 
     def all_unknowns(self, variables: Floats) -> Floats:
         """All unknowns (7 n,) of the variables."""
@@ -179,7 +179,7 @@ class Programme:
     def gradient(self, variables: Floats) -> Floats:
         """Derivative of :meth:`objective`."""
         full = self.cost.gradient(self.state(variables))
-        return np.r_[full[self.free], self.prices]
+        return np.concatenate([full[self.free], self.prices])
 
     def values(self, variables: Floats) -> Floats:
         """Values of all rows."""

@@ -49,7 +49,10 @@ def wanted_views(tiers: tuple[CoverageTier, ...], deficit_deg: Floats) -> Ints:
 
 
 def promise(
-    tiers: tuple[CoverageTier, ...], deficit_deg: Floats, fixed: Bools, earlier: Promises | None = None
+    tiers: tuple[CoverageTier, ...],
+    deficit_deg: Floats,
+    fixed: Bools,
+    earlier: Promises | None = None,
 ) -> Promises:
     """Promise each point its wanted views to the cameras that see it best, or come nearest.
 

@@ -61,7 +61,10 @@ def is_sharp(camera: RigCamera, depth_mm: Floats) -> Bools:
 
 
 def evaluate(
-    subject: Subject, cameras: tuple[RigCamera, ...], limits: Limits, anchor: tuple[Pose, ...] | None = None
+    subject: Subject,
+    cameras: tuple[RigCamera, ...],
+    limits: Limits,
+    anchor: tuple[Pose, ...] | None = None,
 ) -> Quality:
     """Score any given network.
 
@@ -69,10 +72,14 @@ def evaluate(
     not judged. Raises :class:`InputError` when there are no cameras or two share a name.
     """
     if not cameras:
-        raise InputError("no-cameras", "there are no cameras to evaluate", "give at least one camera")
+        raise InputError(
+            "no-cameras", "there are no cameras to evaluate", "give at least one camera"
+        )
     names = [c.name for c in cameras]
     if len(set(names)) < len(names):
-        raise InputError("camera-names", "two cameras have the same name", "give every camera its own name")
+        raise InputError(
+            "camera-names", "two cameras have the same name", "give every camera its own name"
+        )
     scene = Scene(subject, cameras, limits, anchor)
     found = [Sightings.of(scene, position) for position in scene.visibility_positions]
     rest = found[0]
@@ -101,7 +108,8 @@ def _coverage(scene: Scene, found: list[Sightings]) -> tuple[CoverageShare, ...]
     counts = [f.framed.sum(axis=0) for f in found]
     most = max([3, *(t.views for t in scene.limits.coverage.tiers)])
     return tuple(
-        CoverageShare(v, min(float((c >= v).mean()) for c in counts)) for v in range(1, min(most, scene.count) + 1)
+        CoverageShare(v, min(float((c >= v).mean()) for c in counts))
+        for v in range(1, min(most, scene.count) + 1)
     )
 
 
@@ -110,7 +118,7 @@ def _points(scene: Scene, rest: Sightings) -> PointTable:
     weight = rest.framed * scene.ray_weight[:, None]
     state = scene.unknowns.state(scene.start_values())
     normal = normal_matrices(state, scene.scaled(source.points_mm), weight, scene.prior)
-    covariance = np.linalg.inv(normal) * scene.length_mm**2
+    covariance = np.asarray(np.linalg.inv(normal) * scene.length_mm**2, dtype=np.float64)
     longest = np.linalg.eigvalsh(covariance)[:, -1]
     views, sharp = rest.framed.sum(axis=0), rest.sharp.sum(axis=0)
     return PointTable(source, covariance, np.sqrt(longest), views, sharp)
@@ -135,7 +143,11 @@ def convergence_table(cameras: tuple[RigCamera, ...], centroid_mm: Floats) -> Fl
 
 def _cameras(scene: Scene, rest: Sightings) -> CameraTable:
     n = scene.count
-    gsd, incidence, depth = np.full((n, 3), np.nan), np.full((n, 2), np.nan), np.full((n, 2), np.nan)
+    gsd, incidence, depth = (
+        np.full((n, 3), np.nan),
+        np.full((n, 2), np.nan),
+        np.full((n, 2), np.nan),
+    )
     focus = np.empty((n, 2))
     for i, c in enumerate(scene.cameras):
         kind = c.camera
@@ -160,7 +172,10 @@ def _cameras(scene: Scene, rest: Sightings) -> CameraTable:
 
 def nearest_body_mm(scene: Scene) -> Floats:
     """Clearance (n,) of each body's sphere cover to the nearest other one, infinite if alone."""
-    centres = [c.pose.to_rig(o * scene.length_mm) for c, (o, _) in zip(scene.cameras, scene.spheres, strict=True)]
+    centres = [
+        c.pose.to_rig(o * scene.length_mm)
+        for c, (o, _) in zip(scene.cameras, scene.spheres, strict=True)
+    ]
     radii = [r * scene.length_mm for _, r in scene.spheres]
     out = np.full(scene.count, np.inf)
     for i in range(scene.count):

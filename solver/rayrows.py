@@ -39,7 +39,14 @@ def _frame(scene: Scene, camera: Ints, point: Floats) -> list[Candidates]:
     camera, point = np.repeat(camera, 4), np.repeat(point, 4, axis=0)
     pixels = scene.cameras[0].camera.focal_length_px
     block = RayPlanes(
-        "frame", "px", pixels, bound(-_INF, camera), bound(0.0, camera), camera, point, sides[camera, side]
+        "frame",
+        "px",
+        pixels,
+        bound(-_INF, camera),
+        bound(0.0, camera),
+        camera,
+        point,
+        sides[camera, side],
     )
     return [Candidates(block, grouped(camera, side), 4)]
 
@@ -80,18 +87,31 @@ def _focus(scene: Scene, camera: Ints, point: Floats) -> list[Candidates]:
         return []
     scale = scene.length_mm
     kinds = [c.camera for c in scene.cameras]
-    blur = np.array([c.circle_of_confusion_mm * c.f_number / c.focal_length_mm**2 for c in kinds]) * scale
+    blur = (
+        np.array([c.circle_of_confusion_mm * c.f_number / c.focal_length_mm**2 for c in kinds])
+        * scale
+    )
     focal = np.array([c.focal_length_mm for c in kinds]) / scale
     both, side = np.repeat(camera, 2), np.tile([1.0, -1.0], len(camera))
     block = FocusRays(
-        "depth_of_field", "mm", scale, bound(-_INF, both), bound(0.0, both),
-        both, np.repeat(point, 2, axis=0), side, blur[both], focal[both],
-    )  # fmt: skip
+        "depth_of_field",
+        "mm",
+        scale,
+        bound(-_INF, both),
+        bound(0.0, both),
+        both,
+        np.repeat(point, 2, axis=0),
+        side,
+        blur[both],
+        focal[both],
+    )
     return [Candidates(block, grouped(both, side), 4)]
 
 
 def _centring(scene: Scene, seen: Bools) -> list[Candidates]:
-    free = np.array([i for i, c in enumerate(scene.cameras) if not c.fixed and seen[i].any()], dtype=np.int64)
+    free = np.array(
+        [i for i, c in enumerate(scene.cameras) if not c.fixed and seen[i].any()], dtype=np.int64
+    )
     out = []
     if scene.limits.centring is not None:
         camera = np.repeat(free, 2)
@@ -100,7 +120,15 @@ def _centring(scene: Scene, seen: Bools) -> list[Candidates]:
         share = seen[camera] / seen[camera].sum(axis=1, keepdims=True)
         component = np.tile([0, 1], len(free))
         block: Block = MeanImageCoordinate(
-            "centring", "px", pixels, -tolerance, tolerance, camera, component, share, (scene.points,)
+            "centring",
+            "px",
+            pixels,
+            -tolerance,
+            tolerance,
+            camera,
+            component,
+            share,
+            (scene.points,),
         )
         out.append(Candidates.all_of(block))
     if scene.limits.incidence.mean_max_deg is not None:
@@ -124,16 +152,25 @@ def promise_rows(scene: Scene, promises: Promises) -> Candidates:
     normal = np.concatenate([p.directions(normals) for p in positions])
     camera = np.tile(promises.camera, len(positions))
     block = PlaceCones(
-        "coverage", "mm", scale, bound(0.0, camera), bound(_INF, camera),
-        camera, point, normal, bound(opening, camera),
-    )  # fmt: skip
+        "coverage",
+        "mm",
+        scale,
+        bound(0.0, camera),
+        bound(_INF, camera),
+        camera,
+        point,
+        normal,
+        bound(opening, camera),
+    )
     return Candidates(block, grouped(camera), 12)
 
 
 def ray_rows(scene: Scene, seen: Bools, framed: Bools, promises: Promises) -> list[Candidates]:
     """All candidate rows about rays for what the cameras see, or may soon see, now."""
     camera, point = _extremes(scene, framed)
-    rows = _frame(scene, camera, point) + _depths(scene, camera, point) + _focus(scene, camera, point)
+    rows = (
+        _frame(scene, camera, point) + _depths(scene, camera, point) + _focus(scene, camera, point)
+    )
     rows += _centring(scene, seen)
     if len(promises.point):
         rows.append(promise_rows(scene, promises))

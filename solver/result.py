@@ -51,7 +51,7 @@ class ConstraintRow:
 
 @dataclass(frozen=True)
 class CoverageShare:
-    """Share of the region's points seen by ``views`` cameras or more, in the worst head position."""
+    """Share of the points seen by ``views`` cameras or more, in the worst head position."""
 
     views: int
     share: float

@@ -22,7 +22,8 @@ from solver.placerows import place_rows
 from solver.progress import CancelToken
 from solver.rayrows import ray_rows
 from solver.scene import Scene
-from solver.sqp import FIRST_RADIUS, Outcome, Task, minimise
+from solver.sqp import FIRST_RADIUS, Outcome, minimise
+from solver.sqpstate import Task
 from solver.variables import FOCUS, PER_CAMERA, NetworkState
 
 Report = Callable[[int, int, float, float], None]
@@ -60,7 +61,10 @@ class Merit:
             return other is None or self.feasible
         if self.feasible:
             return self.cost < other.cost
-        return (self.breach + self.shortfall, self.cost) < (other.breach + other.shortfall, other.cost)
+        return (self.breach + self.shortfall, self.cost) < (
+            other.breach + other.shortfall,
+            other.cost,
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +105,10 @@ def unknown_bounds(scene: Scene, start: Floats) -> tuple[Floats, Floats]:
     low, high = np.full(len(start), -np.inf), np.full(len(start), np.inf)
     box, scale = scene.limits.bounds, scene.length_mm
     if box is not None:
-        half = [np.inf if v is None else np.radians(v) for v in (box.omega_deg, box.phi_deg, box.kappa_deg)]
+        half = [
+            np.inf if v is None else np.radians(v)
+            for v in (box.omega_deg, box.phi_deg, box.kappa_deg)
+        ]
         half += [np.inf if v is None else v / scale for v in (box.x_mm, box.y_mm, box.z_mm)]
         half.append(np.inf)
         low, high = start - np.tile(half, scene.count), start + np.tile(half, scene.count)
@@ -120,7 +127,11 @@ def covariance_cost(scene: Scene, seen: Views, scale: float = 1.0) -> Covariance
 
 def all_candidates(scene: Scene, state: NetworkState, seen: Views) -> list[Candidates]:
     """Every row that the limits ask for at this state."""
-    return ray_rows(scene, seen.seen, seen.framed, seen.promises) + place_rows(scene, state) + body_rows(scene, state)
+    return (
+        ray_rows(scene, seen.seen, seen.framed, seen.promises)
+        + place_rows(scene, state)
+        + body_rows(scene, state)
+    )
 
 
 def merit(
@@ -128,16 +139,23 @@ def merit(
 ) -> Merit:
     """The true merit of a network whose rays are ``seen`` and whose rows are ``rows``."""
     state = scene.unknowns.state(values)
-    watched = [r.block.violation(state).max(initial=0.0) for r in rows if r.block.family != "coverage"]
+    watched = [
+        r.block.violation(state).max(initial=0.0) for r in rows if r.block.family != "coverage"
+    ]
     free = scene.unknowns.free
     out = np.maximum(bounds[0] - values, values - bounds[1])[free].max(initial=0.0)
     count = seen.seen.sum(axis=0)
-    missing = [t.share - float((count >= min(t.views, scene.count)).mean()) for t in scene.limits.coverage.tiers]
+    missing = [
+        t.share - float((count >= min(t.views, scene.count)).mean())
+        for t in scene.limits.coverage.tiers
+    ]
     cost = covariance_cost(scene, seen).value(state)
     return Merit(float(max([out, 0.0, *watched])), max([0.0, *missing]), cost)
 
 
-def _solve_round(work: _Work, values: Floats, seen: Views, rows: list[Candidates], gain: float, radius: float) -> Outcome:
+def _solve_round(
+    work: _Work, values: Floats, seen: Views, rows: list[Candidates], gain: float, radius: float
+) -> Outcome:
     """Solve with the rays frozen; add a horizon for each promised view that gets hidden."""
     scene = work.scene
     state = scene.unknowns.state(values)
@@ -148,12 +166,23 @@ def _solve_round(work: _Work, values: Floats, seen: Views, rows: list[Candidates
     known = None
     for attempt in range(MAX_HORIZON_PASSES):
         task = Task(
-            scene.unknowns, cost, rows + work.cuts.rows(scene), work.bounds, ("coverage",), work.promise_price
+            scene.unknowns,
+            cost,
+            rows + work.cuts.rows(scene),
+            work.bounds,
+            ("coverage",),
+            work.promise_price,
         )
         # What a horizon will change anyway need not be computed to the last digit first.
         patience = max(gain, 1e-3) if attempt == 0 else gain
         outcome = minimise(
-            task, values, work.watch, gain_tolerance=patience, radius=radius, known=known, max_iterations=MAX_STEPS
+            task,
+            values,
+            work.watch,
+            gain_tolerance=patience,
+            radius=radius,
+            known=known,
+            max_iterations=MAX_STEPS,
         )
         work.iterations += outcome.iterations
         values, known, radius = outcome.values, outcome.multipliers, 0.25 * FIRST_RADIUS
@@ -210,7 +239,9 @@ def thinned(scene: Scene, seed: int) -> tuple[Scene, Ints] | None:
         return None
     chosen = np.sort(np.random.default_rng(seed).choice(count, THINNED_POINTS, replace=False))
     points = scene.subject.design_points.subset(chosen)
-    return replace(scene, subject=replace(scene.subject, design_points=points), origin=scene.origin_mm), chosen
+    return replace(
+        scene, subject=replace(scene.subject, design_points=points), origin=scene.origin_mm
+    ), chosen
 
 
 def run_start(scene: Scene, report: Report, cancel: CancelToken, seed: int = 0) -> StartResult:

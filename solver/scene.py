@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-from geometry.arrays import Bools, Floats, Ints
+from geometry.arrays import Bools, Floats
 from geometry.camera import Camera, RigCamera
 from geometry.frames import PHOTO_TO_CV, Pose
 from geometry.subject import Subject
@@ -78,7 +78,9 @@ class Scene:
         """All unknowns (7 n,) at the poses about which bounds hold."""
         if self.anchor is None:
             return self.start_values()
-        return self.unknowns.pack(self.anchor, np.array([c.focus_distance_mm for c in self.cameras]))
+        return self.unknowns.pack(
+            self.anchor, np.array([c.focus_distance_mm for c in self.cameras])
+        )
 
     def placed(self, values: Floats) -> tuple[RigCamera, ...]:
         """The cameras at the given unknowns; fixed ones are returned as they are."""

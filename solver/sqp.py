@@ -13,16 +13,15 @@ of Optimization, 2nd ed., section 14.4 (S l1 QP); second-order correction as the
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import sparse
 
-from geometry.arrays import Floats, Ints
-from solver.candidates import Candidates
-from solver.programme import Cost, Programme
-from solver.variables import Unknowns
+from geometry.arrays import Floats
+from solver.programme import Programme
+from solver.sqpstate import FEASIBLE, LARGEST_PRICE, Run, Task
 
 Watch = Callable[[int, float, float], bool]
 """Called with iteration, cost and violation; returns False to stop."""
@@ -33,13 +32,6 @@ FIRST_RADIUS = 0.2
 LARGEST_RADIUS = 0.5
 SMALLEST_RADIUS = 1e-9
 FIRST_PRICE = 10.0
-LEAST_PRICE = 0.1
-LARGEST_PRICE = 1e6
-FEASIBLE = 1e-8
-REACH = 2.0
-"""Rows change by at most about this much per unit of the trust radius."""
-
-_PATIENCE = 3
 _FLAT = 0.01
 """Least curvature of a model, in start costs per squared length scale: the turn about the
 optical axis is almost free, and without any curvature such directions wander."""
@@ -68,42 +60,6 @@ class Outcome:
 
 
 @dataclass(frozen=True, eq=False)
-class Task:
-    """What to minimise: cost, candidate rows, bounds of all unknowns (7 n,).
-
-    Rows of the families in ``each`` are broken one by one at the fixed ``each_price``: one that
-    costs more than that is given up. The other families are priced by their worst row, and the
-    price rises until they hold. ``weights`` make a breach of some families dearer than of others.
-    """
-
-    unknowns: Unknowns
-    cost: Cost
-    rows: list[Candidates]
-    bounds: tuple[Floats, Floats]
-    each: tuple[str, ...] = ()
-    each_price: float = 10.0
-    weights: Mapping[str, float] = field(default_factory=dict)
-
-    @property
-    def families(self) -> tuple[str, ...]:
-        """Names of the families priced by their worst row."""
-        names = dict.fromkeys(r.block.family for r in self.rows)
-        return tuple(n for n in names if n not in self.each)
-
-    def breaches(self, values: Floats) -> dict[str, float]:
-        """Breach of each family: its worst row, or the sum of its rows if each has its price."""
-        state = self.unknowns.state(values)
-        total: dict[str, float] = {}
-        for r in self.rows:
-            breach, name = r.block.violation(state), r.block.family
-            if name in self.each:
-                total[name] = total.get(name, 0.0) + float(breach.sum())
-            else:
-                total[name] = max(total.get(name, 0.0), float(breach.max(initial=0.0)))
-        return total
-
-
-@dataclass(frozen=True, eq=False)
 class _Step:
     """Solution of one quadratic programme."""
 
@@ -111,97 +67,6 @@ class _Step:
     multipliers: Floats
     predicted: float
     left: float
-
-
-class _Run:
-    """One solve: the place, the trust region, the price, the working set."""
-
-    def __init__(self, task: Task, start: Floats, known: list[Floats] | None, price: float) -> None:
-        self.task = task
-        self.values = np.clip(start, *task.bounds)
-        self.price = price
-        self.radius = FIRST_RADIUS
-        self.reach = np.inf
-        self.held: list[Ints] = [np.zeros(0, np.int64) for _ in task.rows]
-        sizes = [r.block.rows for r in task.rows]
-        self.multipliers = [np.zeros(s) for s in sizes]
-        for mine, before in zip(self.multipliers, known or [], strict=False):
-            mine[: len(before)] = before
-        self.breaches = task.breaches(self.values)
-        self.gains: list[float] = []
-        self.refused = 0
-        self.cost = task.cost.value(task.unknowns.state(self.values))
-
-    def programme(self) -> Programme:
-        """The working set at the present place."""
-        task = self.task
-        state = task.unknowns.state(self.values)
-        chosen = [
-            r.choose(state, np.union1d(h, np.flatnonzero(m)), REACH * self.radius)
-            for r, h, m in zip(task.rows, self.held, self.multipliers, strict=True)
-        ]
-        self.chosen = chosen
-        blocks = tuple(r.block.take(c) for r, c in zip(task.rows, chosen, strict=True))
-        return Programme(  # fmt: skip
-            task.unknowns, task.cost, blocks, *task.bounds, self.values, task.families, task.each,
-            tuple(self.price * task.weights.get(f, 1.0) for f in task.families), task.each_price,
-        )
-
-    @property
-    def worst(self) -> float:
-        """Breach of the worst family that has to hold."""
-        return max((b for name, b in self.breaches.items() if name not in self.task.each), default=0.0)
-
-    @property
-    def unpriced(self) -> bool:
-        """Whether a row with a price of its own is broken but not yet paid for."""
-        state = self.task.unknowns.state(self.values)
-        return any(
-            bool(((r.block.violation(state) > FEASIBLE) & (np.abs(m) < 0.5 * self.task.each_price)).any())
-            for r, m in zip(self.task.rows, self.multipliers, strict=True)
-            if r.block.family in self.task.each
-        )
-
-    def reprice(self, breach_before: float, left: float) -> None:
-        """Keep the price of a breach above what breaking a limit is worth, but not far above.
-
-        ``left`` is the breach that the last quadratic programme chose to leave. A price that is
-        much too high makes every step creep along curved limits; one too low breaks them.
-        """
-        self.refused = self.refused + 1 if breach_before > 1e-6 and left > 0.5 * breach_before else 0
-        if self.refused >= _PATIENCE:
-            self.price, self.refused = min(5.0 * self.price, LARGEST_PRICE), 0
-        elif self.worst < 1e-5:
-            worth: dict[str, float] = {}
-            for r, m in zip(self.task.rows, self.multipliers, strict=True):
-                worth[r.block.family] = worth.get(r.block.family, 0.0) + float(np.abs(m).sum())
-            needed = max((worth[f] / self.task.weights.get(f, 1.0) for f in self.task.families), default=0.0)
-            if self.price > 4.0 * needed:
-                self.price = max(2.0 * needed, LEAST_PRICE)
-
-    def paid(self, breaches: dict[str, float]) -> float:
-        """Price of the breaches."""
-        task = self.task
-        return sum(
-            b * (task.each_price if n in task.each else self.price * task.weights.get(n, 1.0))
-            for n, b in breaches.items()
-        )
-
-    def merit(self, cost: float, breaches: dict[str, float]) -> float:
-        """What a step must lower: cost and price of the breaches."""
-        return cost + self.paid(breaches)
-
-    def hold_violated(self, values: Floats) -> None:
-        """Work on what is violated at a place that was tried."""
-        state = self.task.unknowns.state(values)
-        self.held = [r.choose(state, h, REACH * self.radius) for r, h in zip(self.task.rows, self.held, strict=True)]
-
-    def remember(self, programme: Programme, multipliers: Floats) -> None:
-        """Spread the multipliers of the working set over the candidate rows."""
-        by_block = programme.by_block(multipliers)
-        for known, chosen, part in zip(self.multipliers, self.chosen, by_block, strict=True):
-            known[:] = 0.0
-            known[chosen] = np.where(np.abs(part) > 1e-9, part, 0.0)
 
 
 def _convex(hessian: Floats, active: Floats) -> Floats:
@@ -226,7 +91,12 @@ def _convex(hessian: Floats, active: Floats) -> Floats:
 
 
 def _quadratic_step(
-    run: _Run, programme: Programme, model: Floats, gradient: Floats, jacobian: sparse.csc_matrix, offsets: Floats
+    run: Run,
+    programme: Programme,
+    model: Floats,
+    gradient: Floats,
+    jacobian: sparse.csc_matrix,
+    offsets: Floats,
 ) -> _Step | None:
     """Minimise the model within the trust region; ``offsets`` (rows,) are the rows' values at 0."""
     import piqp
@@ -242,14 +112,21 @@ def _quadratic_step(
     solver.settings.eps_abs = 1e-10
     solver.settings.eps_rel = 1e-10
     quadratic = sparse.block_diag([model, sparse.csc_matrix((soft, soft))], format="csc")
-    solver.setup(quadratic, gradient, None, None, jacobian, low - offsets, high - offsets, box_low, box_high)
+    solver.setup(
+        quadratic, gradient, None, None, jacobian, low - offsets, high - offsets, box_low, box_high
+    )
     status = solver.solve()
     result = solver.result
-    if status not in (piqp.Status.PIQP_SOLVED, piqp.Status.PIQP_MAX_ITER_REACHED) or not np.isfinite(result.x).all():
+    if (
+        status not in (piqp.Status.PIQP_SOLVED, piqp.Status.PIQP_MAX_ITER_REACHED)
+        or not np.isfinite(result.x).all()
+    ):
         return None
     move = np.clip(result.x[:free], box_low[:free], box_high[:free])
     give = float(gradient[free:] @ np.maximum(result.x[free:], 0.0))
-    predicted = run.paid(run.breaches) - float(gradient[:free] @ move + 0.5 * move @ model @ move) - give
+    predicted = (
+        run.paid(run.breaches) - float(gradient[:free] @ move + 0.5 * move @ model @ move) - give
+    )
     left = float(result.x[free : free + len(programme.soft)].max(initial=0.0))
     return _Step(move, np.asarray(result.z_u - result.z_l), predicted, left)
 
@@ -270,12 +147,17 @@ def minimise(
 
     Stops when the optimality conditions hold to ``tolerance``, or when the last three steps
     were feasible and together gained less than ``gain_tolerance``. ``known`` multipliers of an
-    earlier solve of the same rows, to which others may have been added at the end, speed it up; ``radius`` is the first trust
-    radius and ``price`` the first price of a breach.
+    earlier solve of the same rows, to which others may have been added at the end, speed it up;
+    ``radius`` is the first trust radius and ``price`` the first price of a breach.
     """
-    run = _Run(task, start, known, price)
-    run.radius = radius
-    kkt, why, converged, stopped, iteration = np.inf, "the limit of iterations was reached", False, False, 0
+    run = Run(task, start, known, price, radius)
+    kkt, why, converged, stopped, iteration = (
+        np.inf,
+        "the limit of iterations was reached",
+        False,
+        False,
+        0,
+    )
     for iteration in range(max_iterations + 1):
         worst = run.worst
         if not watch(iteration, run.cost, worst):
@@ -284,13 +166,18 @@ def minimise(
         programme = run.programme()
         x = programme.pack(run.values)
         gradient, jacobian = programme.gradient(x), _sparse(programme, x)
-        weights = programme.from_blocks([m[c] for m, c in zip(run.multipliers, run.chosen, strict=True)])
+        weights = programme.from_blocks(
+            [m[c] for m, c in zip(run.multipliers, run.chosen, strict=True)]
+        )
         kkt = _kkt(run, programme, gradient, jacobian, weights)
         if kkt < tolerance and worst < FEASIBLE and not run.unpriced:
             converged, why = True, "the optimality conditions hold to the tolerance"
             break
         if worst < max(FEASIBLE, 0.01 * gain_tolerance) and _idle(run.gains, gain_tolerance):
-            converged, why = True, f"three steps together gained less than {gain_tolerance:g} of the cost"
+            converged, why = (
+                True,
+                f"three steps together gained less than {gain_tolerance:g} of the cost",
+            )
             break
         if run.radius < SMALLEST_RADIUS:
             if worst < FEASIBLE or run.price >= LARGEST_PRICE:
@@ -301,7 +188,9 @@ def minimise(
         if iteration == max_iterations:
             break
         settling = worst < 1e-4 and run.reach < SETTLING
-        active = jacobian[np.flatnonzero(weights) if settling else []][:, : len(programme.free)].toarray()
+        active = jacobian[np.flatnonzero(weights) if settling else []][
+            :, : len(programme.free)
+        ].toarray()
         model = _convex(programme.hessian_matrix(x, weights), active)
         step = _quadratic_step(run, programme, model, gradient, jacobian, programme.values(x))
         if step is None:
@@ -317,7 +206,12 @@ def _idle(gains: list[float], tolerance: float) -> bool:
 
 
 def _try(
-    run: _Run, programme: Programme, step: _Step, model: Floats, gradient: Floats, jacobian: sparse.csc_matrix
+    run: Run,
+    programme: Programme,
+    step: _Step,
+    model: Floats,
+    gradient: Floats,
+    jacobian: sparse.csc_matrix,
 ) -> None:
     """Take the step if the merit falls as predicted; else correct it once, or shrink the region."""
     before = run.merit(run.cost, run.breaches)
@@ -347,7 +241,10 @@ def _try(
             return
         run.hold_violated(trial)
         if attempt == 0 and np.isfinite(cost):
-            shifted = programme.values(programme.pack(trial)) - jacobian @ np.r_[step.move, np.zeros(programme.concession_count)]
+            shifted = (
+                programme.values(programme.pack(trial))
+                - jacobian @ np.r_[step.move, np.zeros(programme.concession_count)]
+            )
             corrected = _quadratic_step(run, programme, model, gradient, jacobian, shifted)
             if corrected is not None:
                 step = replace(corrected, predicted=step.predicted)
@@ -356,7 +253,7 @@ def _try(
     run.radius = 0.3 * min(run.radius, float(np.abs(step.move).max(initial=0.0)) + 1e-12)
 
 
-def _at(run: _Run, programme: Programme, move: Floats) -> tuple[Floats, float, dict[str, float]]:
+def _at(run: Run, programme: Programme, move: Floats) -> tuple[Floats, float, dict[str, float]]:
     trial = run.values.copy()
     trial[programme.free] += move
     cost = run.task.cost.value(run.task.unknowns.state(trial))
@@ -365,10 +262,14 @@ def _at(run: _Run, programme: Programme, move: Floats) -> tuple[Floats, float, d
 
 def _sparse(programme: Programme, x: Floats) -> sparse.csc_matrix:
     row, column = programme.jacobian_pattern
-    return sparse.csc_matrix((programme.jacobian(x), (row, column)), shape=(programme.rows, programme.size))
+    return sparse.csc_matrix(
+        (programme.jacobian(x), (row, column)), shape=(programme.rows, programme.size)
+    )
 
 
-def _kkt(run: _Run, programme: Programme, gradient: Floats, jacobian: sparse.csc_matrix, weights: Floats) -> float:
+def _kkt(
+    run: Run, programme: Programme, gradient: Floats, jacobian: sparse.csc_matrix, weights: Floats
+) -> float:
     """Largest entry of the Lagrangian's gradient along the free unknowns not held by a bound."""
     free = len(programme.free)
     residual = (gradient + jacobian.T @ weights)[:free]

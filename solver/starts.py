@@ -31,7 +31,9 @@ def axis_rotation(forward: Floats) -> Floats:
     return look_at_rotation(np.zeros(3), forward)
 
 
-def fitting_distance(camera: Camera, limits: Limits, points_mm: Floats, forward: Floats, roll_deg: float) -> float:
+def fitting_distance(
+    camera: Camera, limits: Limits, points_mm: Floats, forward: Floats, roll_deg: float
+) -> float:
     """Smallest distance from the centroid at which all points are in frame and can be in focus.
 
     The camera looks at the centroid along ``forward`` (3,). Within the stand-off limits.
@@ -39,7 +41,9 @@ def fitting_distance(camera: Camera, limits: Limits, points_mm: Floats, forward:
     rotation = look_at_rotation(np.zeros(3), forward, roll_deg)
     middle = points_mm.mean(axis=0)
     local = (points_mm - middle) @ rotation.T
-    left, right, top, bottom = camera.frame_limits(0.0 if limits.frame is None else limits.frame.margin_px)
+    left, right, top, bottom = camera.frame_limits(
+        0.0 if limits.frame is None else limits.frame.margin_px
+    )
     # x / (z + D) <= right, and so on, solved for D.
     needed = [local[:, 0] / right, local[:, 0] / left, local[:, 1] / bottom, local[:, 1] / top]
     frame = float((np.stack(needed) - local[:, 2]).max())
@@ -62,7 +66,9 @@ def _sharp_at(camera: Camera, distance: float, z: Floats) -> bool:
     """Whether some focus distance makes depths ``distance + z`` sharp."""
     near, far = distance + z.min(), distance + z.max()
     # Both limits bind at the harmonic mean: s/(1+k) = near and s/(1-k) = far.
-    focus = camera.focus_distance_mm or max(2.0 * near * far / (near + far), camera.min_focus_distance_mm)
+    focus = camera.focus_distance_mm or max(
+        2.0 * near * far / (near + far), camera.min_focus_distance_mm
+    )
     k = blur_ratio(focus, camera.focal_length_mm, camera.f_number, camera.circle_of_confusion_mm)
     return bool(near > 0.0 and focus - near <= k * near and far - focus <= k * far)
 
@@ -84,12 +90,22 @@ def _clusters(points: SurfacePoints, count: int, seed: int) -> list[tuple[Floats
             mine = np.ones(len(points), dtype=np.bool_)
         normal = points.normals[mine].mean(axis=0)
         length = float(np.linalg.norm(normal))
-        out.append((points.points_mm[mine].mean(axis=0), normal / length if length > 1e-9 else -np.eye(3)[1]))
+        out.append(
+            (
+                points.points_mm[mine].mean(axis=0),
+                normal / length if length > 1e-9 else -np.eye(3)[1],
+            )
+        )
     return sorted(out, key=lambda pair: (round(float(pair[0][0]), 6), round(float(pair[0][2]), 6)))
 
 
 def kmeans_start(
-    subject: Subject, camera: Camera, limits: Limits, names: tuple[str, ...], seed: int, jitter: float = 0.0
+    subject: Subject,
+    camera: Camera,
+    limits: Limits,
+    names: tuple[str, ...],
+    seed: int,
+    jitter: float = 0.0,
 ) -> tuple[RigCamera, ...]:
     """A camera per k-means cluster on its mean normal, looking back along it (Eqs 1-3).
 
@@ -122,7 +138,9 @@ def strip(
     turns = np.radians(np.linspace(-span_deg / 2.0, span_deg / 2.0, len(names)))
     facing = subject.design_points.normals.mean(axis=0)[:2]
     heading = np.arctan2(facing[0], -facing[1])
-    outward = np.stack([np.sin(turns + heading), -np.cos(turns + heading), np.zeros(len(names))], axis=1)
+    outward = np.stack(
+        [np.sin(turns + heading), -np.cos(turns + heading), np.zeros(len(names))], axis=1
+    )
     points = subject.check_points.points_mm
     points = points - points.mean(axis=0) + middle
     roll = better_roll(camera, limits, points, -outward[len(names) // 2])

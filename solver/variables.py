@@ -23,7 +23,7 @@ FOCUS = 6
 
 
 def _elementary(angles: Floats, axis: int) -> tuple[Floats, Floats, Floats]:
-    """Elementary rotations (n, 3, 3) about one axis (0: omega, 1: phi, 2: kappa), two derivatives."""
+    """Elementary rotations (n, 3, 3) by omega (axis 0), phi or kappa, with two derivatives."""
     c, s = np.cos(angles), np.sin(angles)
     sign = -1.0 if axis == 1 else 1.0
     i, j = [(1, 2), (0, 2), (0, 1)][axis]
@@ -106,7 +106,9 @@ class Unknowns:
         w, p, k = (_elementary(table[:, axis], axis) for axis in range(3))
 
         def product(orders: Ints) -> Floats:
-            return np.asarray(PHOTO_TO_CV @ (k[orders[2]] @ p[orders[1]] @ w[orders[0]] @ self.base))
+            return np.asarray(
+                PHOTO_TO_CV @ (k[orders[2]] @ p[orders[1]] @ w[orders[0]] @ self.base)
+            )
 
         once = np.eye(3, dtype=np.int64)
         first = np.stack([product(once[a]) for a in range(3)], axis=1)

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from geometry.arrays import Bools, Floats, Ints
-from geometry.surface import SurfacePoints
 from geometry.raycast import Occluder
+from geometry.surface import SurfacePoints
 from solver.motion import HeadPosition
 
 

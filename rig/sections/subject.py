@@ -5,10 +5,12 @@ from __future__ import annotations
 from typing import Literal, Self
 
 import numpy as np
+from geometry.reading import ScanOptions
 from pydantic import Field, model_validator
 
+from geometry.face import RegionBox as Box
+from geometry.face import RegionSphere as Sphere
 from geometry.preparation import SubjectOptions
-from geometry.reading import ScanOptions
 from rig.strict import StrictModel, Vector
 
 Axis = Literal["+x", "-x", "+y", "-y", "+z", "-z"]

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from geometry.reading import ScanOptions, read_scan
+
 from solver.progress import CancelToken, ProgressCallback
 
 

@@ -50,10 +50,14 @@ class BodyPlanes(Block):
         return camera_columns(self.camera, 6)
 
     def value(self, state: NetworkState) -> Floats:
-        return np.asarray(np.einsum("rm,rm->r", self.normal, carried(state, self.camera, self.offset)))
+        return np.asarray(
+            np.einsum("rm,rm->r", self.normal, carried(state, self.camera, self.offset))
+        )
 
     def jacobian(self, state: NetworkState) -> Floats:
-        return np.asarray(np.einsum("rm,rmc->rc", self.normal, _carried_1(state, self.camera, self.offset)))
+        return np.asarray(
+            np.einsum("rm,rmc->rc", self.normal, _carried_1(state, self.camera, self.offset))
+        )
 
     def add_hessian(self, state: NetworkState, multipliers: Floats, out: Floats) -> None:
         pull = multipliers[:, None] * self.normal
@@ -82,7 +86,9 @@ class BodyDistance(Block):
 
     def jacobian(self, state: NetworkState) -> Floats:
         direction, _ = self._gap(state)
-        return np.asarray(np.einsum("rm,rmc->rc", direction, _carried_1(state, self.camera, self.offset)))
+        return np.asarray(
+            np.einsum("rm,rmc->rc", direction, _carried_1(state, self.camera, self.offset))
+        )
 
     def add_hessian(self, state: NetworkState, multipliers: Floats, out: Floats) -> None:
         direction, length = self._gap(state)
@@ -108,7 +114,9 @@ class BodyPairs(Block):
         return np.hstack([camera_columns(self.first, 6), camera_columns(self.second, 6)])
 
     def _gap(self, state: NetworkState) -> tuple[Floats, Floats]:
-        gap = carried(state, self.first, self.first_offset) - carried(state, self.second, self.second_offset)
+        gap = carried(state, self.first, self.first_offset) - carried(
+            state, self.second, self.second_offset
+        )
         length = np.maximum(np.linalg.norm(gap, axis=1), 1e-12)
         return gap / length[:, None], length
 

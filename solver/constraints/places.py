@@ -117,7 +117,9 @@ class BaseLength(Block):
         return np.hstack([place_columns(self.first), place_columns(self.second)])
 
     def value(self, state: NetworkState) -> Floats:
-        return np.asarray(np.linalg.norm(state.centre[self.first] - state.centre[self.second], axis=1))
+        return np.asarray(
+            np.linalg.norm(state.centre[self.first] - state.centre[self.second], axis=1)
+        )
 
     def jacobian(self, state: NetworkState) -> Floats:
         direction, _ = _unit(state.centre[self.first] - state.centre[self.second])

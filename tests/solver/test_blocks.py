@@ -8,7 +8,13 @@ import rigs
 
 from solver.constraints.base import Block, WeightedSum
 from solver.constraints.bodies import BodyDistance, BodyPairs, BodyPlanes, SightPlanes
-from solver.constraints.places import BaseHeightRatio, BaseLength, PlaceCones, PlaceCoordinate, PlaceDistance
+from solver.constraints.places import (
+    BaseHeightRatio,
+    BaseLength,
+    PlaceCones,
+    PlaceCoordinate,
+    PlaceDistance,
+)
 from solver.constraints.rays import FocusRays, MeanAxisIncidence, MeanImageCoordinate, RayPlanes
 from solver.information import CovarianceCost
 from solver.scene import Scene
@@ -50,31 +56,53 @@ def blocks(scene: Scene) -> dict[str, Block]:
     return {
         "ray_planes": RayPlanes(**head, camera=camera, point=vectors(0.1), normal=vectors(1.0)),
         "focus": FocusRays(
-            **head, camera=camera, point=vectors(0.1), side=rng.choice([-1.0, 1.0], m),
-            blur=np.full(m, 0.1), focal=np.full(m, 0.05),
+            **head,
+            camera=camera,
+            point=vectors(0.1),
+            side=rng.choice([-1.0, 1.0], m),
+            blur=np.full(m, 0.1),
+            focal=np.full(m, 0.05),
         ),
         "mean_image": MeanImageCoordinate(
-            **per_camera, camera=every, component=np.array([0, 1, 0, 1]), seen=seen, points=(scene.points,)
+            **per_camera,
+            camera=every,
+            component=np.array([0, 1, 0, 1]),
+            seen=seen,
+            points=(scene.points,),
         ),
         "axis_incidence": MeanAxisIncidence(
             **per_camera, camera=every, normals=(scene.subject.design_points.normals,)
         ),
-        "cones": PlaceCones(**head, camera=camera, point=vectors(0.1), normal=vectors(1.0), opening=rng.random(m)),
+        "cones": PlaceCones(
+            **head, camera=camera, point=vectors(0.1), normal=vectors(1.0), opening=rng.random(m)
+        ),
         "distance": PlaceDistance(**head, camera=camera, point=vectors(0.1)),
-        "coordinate": PlaceCoordinate(**head, camera=camera, axis=rng.integers(0, 3, m), origin=rng.random(m)),
+        "coordinate": PlaceCoordinate(
+            **head, camera=camera, axis=rng.integers(0, 3, m), origin=rng.random(m)
+        ),
         "base": BaseLength(**head, first=camera, second=other),
         "base_height": ratio,
         "mean": WeightedSum(
-            **(head | {"lower": np.zeros(2), "upper": np.ones(2)}), inner=ratio,
-            weights=rng.random((2, m)), unknowns=UNKNOWNS,
+            **(head | {"lower": np.zeros(2), "upper": np.ones(2)}),
+            inner=ratio,
+            weights=rng.random((2, m)),
+            unknowns=UNKNOWNS,
         ),
         "body_planes": BodyPlanes(**head, camera=camera, offset=vectors(0.05), normal=vectors(1.0)),
-        "body_distance": BodyDistance(**head, camera=camera, offset=vectors(0.05), point=vectors(0.1)),
-        "body_pairs": BodyPairs(
-            **head, first=camera, second=other, first_offset=vectors(0.05), second_offset=vectors(0.05)
+        "body_distance": BodyDistance(
+            **head, camera=camera, offset=vectors(0.05), point=vectors(0.1)
         ),
-        "sight": SightPlanes(**head, camera=camera, other=other, offset=vectors(0.05), normal=vectors(1.0)),
-    }  # fmt: skip
+        "body_pairs": BodyPairs(
+            **head,
+            first=camera,
+            second=other,
+            first_offset=vectors(0.05),
+            second_offset=vectors(0.05),
+        ),
+        "sight": SightPlanes(
+            **head, camera=camera, other=other, offset=vectors(0.05), normal=vectors(1.0)
+        ),
+    }
 
 
 def dense_jacobian(block: Block, scene: Scene, at: np.ndarray) -> np.ndarray:
@@ -83,10 +111,25 @@ def dense_jacobian(block: Block, scene: Scene, at: np.ndarray) -> np.ndarray:
     return out
 
 
-@pytest.mark.parametrize("name", [
-    "ray_planes", "focus", "mean_image", "axis_incidence", "cones", "distance", "coordinate", "base",
-    "base_height", "mean", "body_planes", "body_distance", "body_pairs", "sight",
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "name",
+    [
+        "ray_planes",
+        "focus",
+        "mean_image",
+        "axis_incidence",
+        "cones",
+        "distance",
+        "coordinate",
+        "base",
+        "base_height",
+        "mean",
+        "body_planes",
+        "body_distance",
+        "body_pairs",
+        "sight",
+    ],
+)
 def test_derivatives_match_central_differences(name: str, scene: Scene, values: np.ndarray) -> None:
     block = blocks(scene)[name]
     units = np.eye(UNKNOWNS)
@@ -94,7 +137,9 @@ def test_derivatives_match_central_differences(name: str, scene: Scene, values: 
     def value(at: np.ndarray) -> np.ndarray:
         return block.value(scene.unknowns.state(at))
 
-    numeric = np.stack([(value(values + STEP * e) - value(values - STEP * e)) / (2 * STEP) for e in units], axis=1)
+    numeric = np.stack(
+        [(value(values + STEP * e) - value(values - STEP * e)) / (2 * STEP) for e in units], axis=1
+    )
     jacobian = dense_jacobian(block, scene, values)
     assert np.abs(jacobian).max() > 0.01
     np.testing.assert_allclose(jacobian, numeric, atol=TOLERANCE * max(1.0, np.abs(jacobian).max()))
@@ -103,16 +148,26 @@ def test_derivatives_match_central_differences(name: str, scene: Scene, values: 
     hessian = np.zeros((UNKNOWNS, UNKNOWNS))
     block.add_hessian(scene.unknowns.state(values), weights, hessian)
     by_step = [
-        weights @ (dense_jacobian(block, scene, values + STEP * e) - dense_jacobian(block, scene, values - STEP * e))
+        weights
+        @ (
+            dense_jacobian(block, scene, values + STEP * e)
+            - dense_jacobian(block, scene, values - STEP * e)
+        )
         for e in units
     ]
-    np.testing.assert_allclose(hessian, np.stack(by_step) / (2 * STEP), atol=10 * TOLERANCE * max(1.0, np.abs(hessian).max()))
+    np.testing.assert_allclose(
+        hessian,
+        np.stack(by_step) / (2 * STEP),
+        atol=10 * TOLERANCE * max(1.0, np.abs(hessian).max()),
+    )
 
 
 def test_cost_derivatives_match_central_differences(scene: Scene, values: np.ndarray) -> None:
     weight = np.broadcast_to(scene.ray_weight[:, None], (CAMERAS, len(scene.points)))
     cost = CovarianceCost(scene.points, weight, scene.prior)
-    cost = CovarianceCost(scene.points, weight, scene.prior, cost.typical(scene.unknowns.state(values)))
+    cost = CovarianceCost(
+        scene.points, weight, scene.prior, cost.typical(scene.unknowns.state(values))
+    )
     units = np.eye(UNKNOWNS)
 
     def gradient(at: np.ndarray) -> np.ndarray:
@@ -122,9 +177,13 @@ def test_cost_derivatives_match_central_differences(scene: Scene, values: np.nda
         return cost.value(scene.unknowns.state(at))
 
     state = scene.unknowns.state(values)
-    numeric = np.array([(value(values + STEP * e) - value(values - STEP * e)) / (2 * STEP) for e in units])
+    numeric = np.array(
+        [(value(values + STEP * e) - value(values - STEP * e)) / (2 * STEP) for e in units]
+    )
     np.testing.assert_allclose(cost.gradient(state), numeric, atol=1e-6 * np.abs(numeric).max())
-    second = np.stack([(gradient(values + STEP * e) - gradient(values - STEP * e)) / (2 * STEP) for e in units])
+    second = np.stack(
+        [(gradient(values + STEP * e) - gradient(values - STEP * e)) / (2 * STEP) for e in units]
+    )
     np.testing.assert_allclose(cost.hessian(state), second, atol=1e-6 * np.abs(second).max())
 
 
@@ -140,4 +199,6 @@ def test_taking_rows_keeps_their_values(scene: Scene, values: np.ndarray) -> Non
     rows = np.array([3, 0, 7])
     for name, block in blocks(scene).items():
         if block.rows > 7:
-            np.testing.assert_array_equal(block.take(rows).value(state), block.value(state)[rows], err_msg=name)
+            np.testing.assert_array_equal(
+                block.take(rows).value(state), block.value(state)[rows], err_msg=name
+            )

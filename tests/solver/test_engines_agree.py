@@ -14,7 +14,8 @@ from solver.limits import Coverage, MotionBox
 from solver.programme import Programme
 from solver.rounds import all_candidates, covariance_cost, unknown_bounds
 from solver.scene import Scene
-from solver.sqp import Task, minimise
+from solver.sqp import minimise
+from solver.sqpstate import Task
 
 # The promise of agreement in docs/decisions: one part in a thousand of the cost.
 AGREE = 1e-3

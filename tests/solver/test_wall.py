@@ -27,7 +27,12 @@ def solved(limits_key: str) -> Design:
         "held height, no minimum": held_height(None),
     }[limits_key]
     return design(
-        rigs.wall(), rigs.wall_camera(), limits, count=4, starts=8, start=rigs.wall_poses(rigs.WALL_START)
+        rigs.wall(),
+        rigs.wall_camera(),
+        limits,
+        count=4,
+        starts=8,
+        start=rigs.wall_poses(rigs.WALL_START),
     )
 
 
@@ -50,7 +55,14 @@ def test_beats_the_printed_poses_with_all_constraints_met() -> None:
     for row in found.quality.constraints:
         assert row.slack >= -1e-6 * scale[row.unit], row
     families = {row.family for row in found.quality.constraints}
-    assert {"frame", "centring_x", "base_height_min", "base_height_mean_min", "incidence_mean", "bound_x"} <= families
+    assert {
+        "frame",
+        "centring_x",
+        "base_height_min",
+        "base_height_mean_min",
+        "incidence_mean",
+        "bound_x",
+    } <= families
 
 
 def test_bounds_bind_as_in_the_paper() -> None:
@@ -71,7 +83,10 @@ def test_without_centring_images_are_off_centre_but_the_rest_holds() -> None:
     without = solved("no centring")
     assert without.quality.feasible
     middle = [
-        np.linalg.norm(c.camera.project(c.pose, rigs.WALL_TARGETS_MM)[0].mean(axis=0) - c.camera.principal_point_px)
+        np.linalg.norm(
+            c.camera.project(c.pose, rigs.WALL_TARGETS_MM)[0].mean(axis=0)
+            - c.camera.principal_point_px
+        )
         for c in without.cameras
     ]
     assert max(middle) > 100.0

@@ -65,16 +65,23 @@ def ellipsoid_points(count: int, seed: int, half_angle_deg: float = 55.0) -> Sur
 
 def face(count: int = 150, check: int = 600) -> Subject:
     """An ellipsoid face with the ellipsoid as occluder."""
-    return Subject(ellipsoid_points(count, 1), ellipsoid_points(check, 2), Occluder(*ellipsoid_mesh()))
+    return Subject(
+        ellipsoid_points(count, 1), ellipsoid_points(check, 2), Occluder(*ellipsoid_mesh())
+    )
 
 
 def compact_camera(**changes: object) -> Camera:
     """The paper's camera: 62 x 45 x 32 mm, 50 mm lens, 26 degrees."""
     values = {
-        "name": "compact", "image_size_px": (4000, 2667), "pixel_pitch_mm": 23.1 / 4000,
-        "focal_length_mm": 50.0, "f_number": 16.0, "circle_of_confusion_mm": 2 * 23.1 / 4000,
-        "min_focus_distance_mm": 350.0, "body": Body([62.0, 45.0, 32.0], [0.0, 0.0, -30.0], 30.0, 25.0),
-    }  # fmt: skip
+        "name": "compact",
+        "image_size_px": (4000, 2667),
+        "pixel_pitch_mm": 23.1 / 4000,
+        "focal_length_mm": 50.0,
+        "f_number": 16.0,
+        "circle_of_confusion_mm": 2 * 23.1 / 4000,
+        "min_focus_distance_mm": 350.0,
+        "body": Body([62.0, 45.0, 32.0], [0.0, 0.0, -30.0], 30.0, 25.0),
+    }
     return Camera(**(values | changes))  # type: ignore[arg-type]
 
 
@@ -95,25 +102,40 @@ def names(count: int) -> tuple[str, ...]:
     return tuple(f"cam{k:02d}" for k in range(1, count + 1))
 
 
-def face_cameras(subject: Subject, count: int, limits: Limits | None = None, seed: int = 0) -> tuple[RigCamera, ...]:
+def face_cameras(
+    subject: Subject, count: int, limits: Limits | None = None, seed: int = 0
+) -> tuple[RigCamera, ...]:
     """The k-means start on a subject."""
     return kmeans_start(subject, compact_camera(), limits or face_limits(), names(count), seed)
 
 
-WALL_TARGETS_MM = 1000.0 * np.array([
-    (-19.5, 1.2, 12.0), (19.5, 1.2, 12.0), (19.5, 1.2, -2.0), (-19.5, 1.2, -2.0), (0.0, 1.2, 5.0),
-    (-10.0, 1.2, 12.0), (10.0, 1.2, 12.0), (10.0, 1.2, -2.0), (-10.0, 1.2, -2.0),
-])  # fmt: skip
+WALL_TARGETS_MM = 1000.0 * np.array(
+    [
+        (-19.5, 1.2, 12.0),
+        (19.5, 1.2, 12.0),
+        (19.5, 1.2, -2.0),
+        (-19.5, 1.2, -2.0),
+        (0.0, 1.2, 5.0),
+        (-10.0, 1.2, 12.0),
+        (10.0, 1.2, 12.0),
+        (10.0, 1.2, -2.0),
+        (-10.0, 1.2, -2.0),
+    ]
+)
 
 WALL_START = (
-    (90.12, 5.51, 0.0, 1.00, -24.23, 4.82), (91.00, 0.48, 0.0, 0.40, -35.74, 5.80),
-    (90.49, 5.22, 0.0, -0.82, -33.74, -0.85), (90.16, 4.98, 0.0, 0.58, -36.45, 1.15),
-)  # fmt: skip
+    (90.12, 5.51, 0.0, 1.00, -24.23, 4.82),
+    (91.00, 0.48, 0.0, 0.40, -35.74, 5.80),
+    (90.49, 5.22, 0.0, -0.82, -33.74, -0.85),
+    (90.16, 4.98, 0.0, 0.58, -36.45, 1.15),
+)
 
 WALL_PRINTED = (
-    (81.21, -21.09, 0.0, -14.00, -28.64, 5.82), (79.12, 23.49, 0.0, 15.40, -27.69, 7.93),
-    (102.99, -24.20, 0.0, -15.82, -27.25, -0.44), (99.15, 23.85, 0.0, 15.58, -27.66, 1.32),
-)  # fmt: skip
+    (81.21, -21.09, 0.0, -14.00, -28.64, 5.82),
+    (79.12, 23.49, 0.0, 15.40, -27.69, 7.93),
+    (102.99, -24.20, 0.0, -15.82, -27.25, -0.44),
+    (99.15, 23.85, 0.0, 15.58, -27.66, 1.32),
+)
 """Table 2 of the paper: omega, phi, kappa in degrees, X, Y, Z in metres."""
 
 
@@ -125,7 +147,9 @@ def wall() -> Subject:
 
 def wall_poses(table: tuple[tuple[float, ...], ...]) -> tuple[Pose, ...]:
     """Poses of a table of angles and metres."""
-    return tuple(Pose.from_omega_phi_kappa(np.array(r[3:]) * 1000.0, np.array(r[:3])) for r in table)
+    return tuple(
+        Pose.from_omega_phi_kappa(np.array(r[3:]) * 1000.0, np.array(r[:3])) for r in table
+    )
 
 
 def wall_camera() -> Camera:
@@ -139,7 +163,8 @@ def wall_cameras(table: tuple[tuple[float, ...], ...]) -> tuple[RigCamera, ...]:
     """Cameras at the poses of a table."""
     middle = WALL_TARGETS_MM.mean(axis=0)
     return tuple(
-        camera_at(wall_camera(), f"cam{k:02d}", pose, middle) for k, pose in enumerate(wall_poses(table), 1)
+        camera_at(wall_camera(), f"cam{k:02d}", pose, middle)
+        for k, pose in enumerate(wall_poses(table), 1)
     )
 
 
@@ -149,8 +174,11 @@ def wall_limits(**changes: object) -> Limits:
         "bounds": PoseBounds(45.0, 45.0, 45.0, 15000.0, 15000.0, 15000.0),
         "base_height": BaseHeight(min=0.2, mean_min=0.6),
         "incidence": Incidence(ray_max_deg=89.0, mean_max_deg=30.0),
-        "frame": Frame(), "centring": Centring(), "depth_of_field": False,
-        "body_clearance_mm": None, "sight_line_clearance_mm": None,
+        "frame": Frame(),
+        "centring": Centring(),
+        "depth_of_field": False,
+        "body_clearance_mm": None,
+        "sight_line_clearance_mm": None,
         "coverage": Coverage(unseen_sigma_mm=1e6),
-    }  # fmt: skip
+    }
     return Limits(**(values | changes))  # type: ignore[arg-type]
