@@ -12,7 +12,7 @@ from solver.candidates import Candidates
 from solver.constraints.base import bound
 from solver.constraints.places import PlaceCones
 from solver.motion import HeadPosition
-from solver.promises import Promises, promise
+from solver.promises import Margins, Promises, promise
 from solver.scene import Scene
 from solver.variables import NetworkState
 from solver.visibility import Sight, cosines, horizons, sight
@@ -21,6 +21,7 @@ _HORIZON_MARGIN = float(np.sin(np.radians(0.3)))
 """A camera stays this far above a horizon: ray casting against facets is no more exact."""
 
 
+FIRST_MARGINS = Margins()
 _ABOUT_TO_BE_SEEN_DEG = 15.0
 """How far beyond the limit of incidence points are framed: about what a camera swings by in a
 round. With less, round after round finds new points just outside the frame."""
@@ -38,13 +39,14 @@ class Views:
     seen: Bools
     framed: Bools
     promises: Promises
+    margin_deg: float = 0.0
 
     def among(self, scene: Scene, chosen: Ints) -> Views:
         """The same views of a scene of whose design points these were the ``chosen`` ones."""
         seen = np.zeros((scene.count, len(scene.subject.design_points)), dtype=np.bool_)
         seen[:, chosen] = self.seen
         promises = Promises(self.promises.camera, chosen[self.promises.point], self.promises.kept)
-        return Views(seen, self.framed, promises)
+        return Views(seen, self.framed, promises, self.margin_deg)
 
 
 def centres_mm(scene: Scene, state: NetworkState) -> Floats:
@@ -61,12 +63,18 @@ def in_frame(camera: RigCamera, points_mm: Floats, margin_px: float = 0.0) -> Bo
     return np.asarray(inside & (depth > 0.0))
 
 
-def views(scene: Scene, state: NetworkState, earlier: Views | None = None) -> Views:
+def views(
+    scene: Scene,
+    state: NetworkState,
+    earlier: Views | None = None,
+    margins: Margins = FIRST_MARGINS,
+) -> Views:
     """Cast all rays and decide which views to promise.
 
     Free cameras are given frame and focus as limits, so facing and a free line of sight are
     enough; fixed cameras only see what is in their frame. What was framed and promised in an
-    ``earlier`` round is held on to, so that rounds settle.
+    ``earlier`` round is held on to, so that rounds settle. ``margins`` say what
+    is promised beyond what the tiers ask.
     """
     source = scene.subject.design_points
     limit = scene.limits.incidence.ray_max_deg
@@ -82,8 +90,28 @@ def views(scene: Scene, state: NetworkState, earlier: Views | None = None) -> Vi
     before = None
     if earlier is not None:
         framed, before = framed | earlier.framed, earlier.promises
-    deficits = _deficits(scene, state, found, seen)
-    return Views(seen, framed, promise(scene.limits.coverage.tiers, deficits, fixed, before))
+    deficits = _deficits(scene, state, found, seen, margins.angle_deg)
+    promises = promise(scene.limits.coverage.tiers, deficits, fixed, margins.share, before)
+    return Views(seen, framed, promises, margins.angle_deg)
+
+
+def shortfall(scene: Scene, state: NetworkState) -> float:
+    """By how much the worst coverage tier is missed on the check points; 0 when all are met."""
+    tiers = scene.limits.coverage.tiers
+    if not tiers:
+        return 0.0
+    source, limit = scene.subject.check_points, scene.limits.incidence.ray_max_deg
+    worst = 0.0
+    for position in scene.visibility_positions:
+        found = sight(
+            source, scene.subject.occluder, centres_mm(scene, state), limit, (position,)
+        ).seen
+        for i, camera in enumerate(scene.cameras):
+            if camera.fixed:
+                found[i] &= in_frame(camera, position.points(source.points_mm))
+        count = found.sum(axis=0)
+        worst = max(worst, *(t.share - float((count >= t.views).mean()) for t in tiers))
+    return max(0.0, worst)
 
 
 def _facing(scene: Scene, state: NetworkState, limit_deg: float) -> Bools:
@@ -97,13 +125,15 @@ def _facing(scene: Scene, state: NetworkState, limit_deg: float) -> Bools:
     return out
 
 
-def _deficits(scene: Scene, state: NetworkState, found: Sight, seen: Bools) -> Floats:
+def _deficits(
+    scene: Scene, state: NetworkState, found: Sight, seen: Bools, margin_deg: float
+) -> Floats:
     """How far each camera is from seeing each point, (n, p) degrees; see :func:`promise`."""
-    limit = scene.limits.incidence.ray_max_deg
+    limit = scene.limits.incidence.ray_max_deg - margin_deg
     incidence = np.degrees(np.arccos(np.clip(found.cosine, -1.0, 1.0)))
     out = np.where(seen, incidence - limit - 1e-9, np.inf)
     most = max((t.views for t in scene.limits.coverage.tiers), default=0)
-    poor = seen.sum(axis=0) < min(most, scene.count)
+    poor = (out <= 0.0).sum(axis=0) < min(most, scene.count)
     camera, point = np.nonzero(~seen & poor)
     if len(camera) == 0:
         return out

@@ -9,15 +9,14 @@ import numpy as np
 from geometry.arrays import Bools, Floats, Ints
 from solver.limits import CoverageTier
 
-_SPARE_SHARE = 0.01
-"""Promised beyond a tier's share, because the region is judged on other points than it is
-designed on."""
-
 FARTHEST_DEG = 30.0
 """A view further than this from being possible is not promised: the camera has other work."""
 
 
 _LOYALTY_DEG = 10.0
+_MOST_SHARE = 0.2
+_ANGLE_STEP_DEG = 1.0
+_MOST_ANGLE_DEG = 8.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,17 +31,36 @@ class Promises:
     kept: Bools
 
 
-def wanted_views(tiers: tuple[CoverageTier, ...], deficit_deg: Floats) -> Ints:
+@dataclass(frozen=True)
+class Margins:
+    """What is promised beyond what is asked, because other points are judged than are promised.
+
+    ``share`` of points beyond each tier's, and ``angle_deg`` by which promised rays stay within
+    the limit of incidence. Both grow, round by round, while the judged coverage falls short.
+    """
+
+    share: float = 0.01
+    angle_deg: float = 0.0
+
+    def wider(self, shortfall: float) -> Margins:
+        """Margins for the next round, after coverage fell short by a share."""
+        share = min(self.share + 1.5 * shortfall + 0.002, _MOST_SHARE)
+        return Margins(share, min(self.angle_deg + _ANGLE_STEP_DEG, _MOST_ANGLE_DEG))
+
+
+def wanted_views(tiers: tuple[CoverageTier, ...], deficit_deg: Floats, spare: float) -> Ints:
     """How many views each point should have, (p,): the tiers' shares go to the easiest points.
 
-    A point is the easier for n views the smaller the deficit of its nth-best camera.
+    A point is the easier for n views the smaller the deficit of its nth-best camera. ``spare``
+    is promised beyond each share, because the region is judged on other points than it is
+    designed on.
     """
     n, p = deficit_deg.shape
     ranked = np.sort(deficit_deg, axis=0)
     wanted = np.zeros(p, dtype=np.int64)
     for tier in sorted(tiers, key=lambda t: t.views):
         views = min(tier.views, n)
-        count = int(np.ceil(min(1.0, tier.share + _SPARE_SHARE) * p))
+        count = int(np.ceil(min(1.0, tier.share + spare) * p))
         chosen = np.argsort(ranked[views - 1], kind="stable")[:count]
         wanted[chosen] = np.maximum(wanted[chosen], views)
     return wanted
@@ -52,6 +70,7 @@ def promise(
     tiers: tuple[CoverageTier, ...],
     deficit_deg: Floats,
     fixed: Bools,
+    spare: float = 0.0,
     earlier: Promises | None = None,
 ) -> Promises:
     """Promise each point its wanted views to the cameras that see it best, or come nearest.
@@ -65,7 +84,7 @@ def promise(
     if earlier is not None:
         deficit_deg = deficit_deg.copy()
         deficit_deg[earlier.camera, earlier.point] -= _LOYALTY_DEG
-    wanted = wanted_views(tiers, deficit_deg)
+    wanted = wanted_views(tiers, deficit_deg, spare)
     # Fixed cameras come first where they see the point and not at all where they do not.
     order = np.where(fixed[:, None], np.where(kept, -1e3, np.inf), deficit_deg)
     rank = np.argsort(np.argsort(order, axis=0, kind="stable"), axis=0)

@@ -141,10 +141,10 @@ def _centring(scene: Scene, seen: Bools) -> list[Candidates]:
     return out
 
 
-def promise_rows(scene: Scene, promises: Promises) -> Candidates:
+def promise_rows(scene: Scene, promises: Promises, margin_deg: float) -> Candidates:
     """Incidence of every promised ray, in every head position, (m,) rows."""
     scale = scene.length_mm
-    opening = np.cos(np.radians(scene.limits.incidence.ray_max_deg))
+    opening = np.cos(np.radians(scene.limits.incidence.ray_max_deg - margin_deg))
     source = scene.subject.design_points
     points, normals = source.points_mm[promises.point], source.normals[promises.point]
     positions = scene.visibility_positions
@@ -165,7 +165,9 @@ def promise_rows(scene: Scene, promises: Promises) -> Candidates:
     return Candidates(block, grouped(camera), 12)
 
 
-def ray_rows(scene: Scene, seen: Bools, framed: Bools, promises: Promises) -> list[Candidates]:
+def ray_rows(
+    scene: Scene, seen: Bools, framed: Bools, promises: Promises, margin_deg: float
+) -> list[Candidates]:
     """All candidate rows about rays for what the cameras see, or may soon see, now."""
     camera, point = _extremes(scene, framed)
     rows = (
@@ -173,5 +175,5 @@ def ray_rows(scene: Scene, seen: Bools, framed: Bools, promises: Promises) -> li
     )
     rows += _centring(scene, seen)
     if len(promises.point):
-        rows.append(promise_rows(scene, promises))
+        rows.append(promise_rows(scene, promises, margin_deg))
     return [r for r in rows if r.block.rows]

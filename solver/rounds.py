@@ -16,10 +16,19 @@ import numpy as np
 from geometry.arrays import Floats, Ints
 from solver.bodyrows import body_rows
 from solver.candidates import Candidates
-from solver.coverage import Cuts, Views, cuts_for_hidden, opening_directions, views
+from solver.coverage import (
+    FIRST_MARGINS,
+    Cuts,
+    Views,
+    cuts_for_hidden,
+    opening_directions,
+    shortfall,
+    views,
+)
 from solver.information import CovarianceCost
 from solver.placerows import place_rows
 from solver.progress import CancelToken
+from solver.promises import Margins
 from solver.rayrows import ray_rows
 from solver.scene import Scene
 from solver.sqp import FIRST_RADIUS, Outcome, minimise
@@ -32,6 +41,7 @@ Report = Callable[[int, int, float, float], None]
 MAX_ROUNDS = 12
 MAX_HORIZON_PASSES = 4
 MAX_STEPS = 40
+MAX_PROMISE_PRICE = 1e3
 SATISFIED = 1e-6
 """Rows count as satisfied within this, in the solver's units of order one."""
 
@@ -92,6 +102,7 @@ class _Work:
     iterations: int = 0
     round: int = 0
     promise_price: float = 10.0
+    margins: Margins = FIRST_MARGINS
     cuts: Cuts = field(default_factory=Cuts.none)
     seen: Views | None = None
 
@@ -128,7 +139,7 @@ def covariance_cost(scene: Scene, seen: Views, scale: float = 1.0) -> Covariance
 def all_candidates(scene: Scene, state: NetworkState, seen: Views) -> list[Candidates]:
     """Every row that the limits ask for at this state."""
     return (
-        ray_rows(scene, seen.seen, seen.framed, seen.promises)
+        ray_rows(scene, seen.seen, seen.framed, seen.promises, seen.margin_deg)
         + place_rows(scene, state)
         + body_rows(scene, state)
     )
@@ -144,13 +155,8 @@ def merit(
     ]
     free = scene.unknowns.free
     out = np.maximum(bounds[0] - values, values - bounds[1])[free].max(initial=0.0)
-    count = seen.seen.sum(axis=0)
-    missing = [
-        t.share - float((count >= min(t.views, scene.count)).mean())
-        for t in scene.limits.coverage.tiers
-    ]
     cost = covariance_cost(scene, seen).value(state)
-    return Merit(float(max([out, 0.0, *watched])), max([0.0, *missing]), cost)
+    return Merit(float(max([out, 0.0, *watched])), shortfall(scene, state), cost)
 
 
 def _solve_round(
@@ -206,11 +212,13 @@ def _level(
         rows = all_candidates(scene, scene.unknowns.state(values), seen)
         outcome = _solve_round(work, values, seen, rows, gain, radius)
         state = scene.unknowns.state(outcome.values)
-        seen = views(scene, state, seen)
+        missing = shortfall(scene, state)
+        if missing > 0.0:
+            work.promise_price = min(2.0 * work.promise_price, MAX_PROMISE_PRICE)
+            work.margins = work.margins.wider(missing)
+        seen = views(scene, state, seen, work.margins)
         now = merit(scene, outcome.values, seen, all_candidates(scene, state, seen), work.bounds)
         before = None if best is None else best[1]
-        if now.shortfall > 0.0:
-            work.promise_price *= 5.0
         if now.better_than(before):
             best = (outcome.values, now, outcome)
         if outcome.stopped:

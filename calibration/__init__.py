@@ -1,0 +1,1 @@
+"""Calibration floor: what measured image points say about points and cameras."""
