@@ -15,6 +15,7 @@ _WELD_SHARE = 1e-7
 _PIECE_SHARE = 0.02
 _INNER_PIECE_SHARE = 0.002
 _NAN_SHARE = 0.01
+_MAX_COORDINATE = 1e15
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +49,8 @@ def clean_mesh(raw: RawScan, drop_pieces: bool = True) -> CleanMesh:
 def drop_not_finite(raw: RawScan) -> tuple[RawScan, tuple[ScanNote, ...]]:
     """The scan without the few vertices that hold NaN or infinity and the faces that use them.
 
-    Raises :class:`InputError` for an empty scan, and when one vertex in a hundred is not finite.
+    Raises :class:`InputError` for an empty scan, when more than one vertex in a hundred is not
+    finite, and for coordinates so large that their products overflow.
     """
     if len(raw.vertices) == 0:
         problem = "the scan has no faces and no points"
@@ -56,8 +58,11 @@ def drop_not_finite(raw: RawScan) -> tuple[RawScan, tuple[ScanNote, ...]]:
     if len(raw.faces) and (raw.faces.min() < 0 or raw.faces.max() >= len(raw.vertices)):
         problem = "faces of the scan refer to vertices it lacks"
         raise InputError("scan-faces-index", problem, "export the scan again")
-    good = np.isfinite(raw.vertices).all(axis=1)
+    good = np.asarray(np.isfinite(raw.vertices).all(axis=1))
     bad = int(np.count_nonzero(~good))
+    if bad < len(good) and np.abs(raw.vertices[good]).max() > _MAX_COORDINATE:
+        problem = "the scan has coordinates of astronomical size"
+        raise InputError("scan-coordinates", problem, "repair the scan and export it again")
     if bad == 0:
         return raw, ()
     if bad > _NAN_SHARE * len(good):
@@ -70,6 +75,14 @@ def drop_not_finite(raw: RawScan) -> tuple[RawScan, tuple[ScanNote, ...]]:
     return kept, (_changed(bad, "vertices that are NaN or infinite dropped"),)
 
 
+def unique_rows(rows: Ints) -> tuple[Ints, Ints]:
+    """Where each different row of (N, 3) stands first, and the different row that each is, (N,)."""
+    from trimesh import grouping
+
+    first, inverse = grouping.unique_rows(rows)  # type: ignore[no-untyped-call]
+    return np.asarray(first, dtype=np.int64), np.asarray(inverse, dtype=np.int64)
+
+
 def _changed(count: int, what: str) -> ScanNote:
     return ScanNote("changed", f"{count:,} {what}")
 
@@ -80,8 +93,6 @@ def _add(notes: list[ScanNote], count: int, what: str) -> None:
 
 
 def _weld(vertices: Floats, faces: Ints, notes: list[ScanNote]) -> tuple[Floats, Ints]:
-    from trimesh.grouping import unique_rows
-
     size = float(np.ptp(vertices, axis=0).max())
     if size == 0.0:
         return vertices, faces
@@ -89,7 +100,7 @@ def _weld(vertices: Floats, faces: Ints, notes: list[ScanNote]) -> tuple[Floats,
     local = np.round((vertices - vertices.min(axis=0)) / (size * _WELD_SHARE)).astype(np.int64)
     first, inverse = unique_rows(local)
     _add(notes, len(vertices) - len(first), "vertices at the same place welded")
-    return vertices[first], np.asarray(inverse, dtype=np.int64)[faces]
+    return vertices[first], inverse[faces]
 
 
 def _areas(vertices: Floats, faces: Ints) -> Floats:
@@ -98,8 +109,6 @@ def _areas(vertices: Floats, faces: Ints) -> Floats:
 
 
 def _drop_broken_faces(vertices: Floats, faces: Ints, notes: list[ScanNote]) -> Ints:
-    from trimesh.grouping import unique_rows
-
     # Area below float64 rounding of the scan's size squared: no normal can be had from it.
     size = float(np.ptp(vertices, axis=0).max())
     sound = _areas(vertices, faces) > 1e-14 * size**2
@@ -109,7 +118,7 @@ def _drop_broken_faces(vertices: Floats, faces: Ints, notes: list[ScanNote]) -> 
         return faces
     first, _ = unique_rows(np.sort(faces, axis=1))
     _add(notes, len(faces) - len(first), "duplicate faces dropped")
-    return faces[np.sort(first)]
+    return np.asarray(faces[np.sort(first)])
 
 
 def _face_pieces(faces: Ints, vertex_count: int) -> Ints:
@@ -146,7 +155,7 @@ def _drop_floating_pieces(vertices: Floats, faces: Ints, notes: list[ScanNote]) 
         return faces
     lost = int(sizes[~keep].sum())
     _add(notes, int(np.count_nonzero(~keep)), f"floating pieces dropped ({lost:,} faces)")
-    return faces[keep[piece]]
+    return np.asarray(faces[keep[piece]])
 
 
 def _wind_outward(vertices: Floats, faces: Ints, notes: list[ScanNote]) -> Ints:
@@ -155,15 +164,15 @@ def _wind_outward(vertices: Floats, faces: Ints, notes: list[ScanNote]) -> Ints:
     mesh = trimesh.Trimesh(vertices, faces, process=False)
     wound = faces
     if not mesh.is_winding_consistent:
-        trimesh.repair.fix_winding(mesh)
+        trimesh.repair.fix_winding(mesh)  # type: ignore[no-untyped-call]
         wound = np.asarray(mesh.faces, dtype=np.int64)
     piece = _face_pieces(wound, len(vertices))
     a, b, c = (vertices[wound[:, k]] for k in range(3))
     doubled, middle = np.cross(b - a, c - a), (a + b + c) / 3.0
     area = np.linalg.norm(doubled, axis=1)
     total = np.bincount(piece, area)
-    centre = np.stack([np.bincount(piece, area * middle[:, k]) for k in range(3)], axis=1)
-    centre /= total[:, None]
+    moment = np.stack([np.bincount(piece, area * middle[:, k]) for k in range(3)], axis=1)
+    centre = moment / total[:, None]
     # For a closed piece this is six times its volume wherever the centre is; an open one, like a
     # face seen from the front, bulges outward from the centre of its area.
     outward = np.bincount(piece, np.einsum("ij,ij->i", doubled, middle - centre[piece]))

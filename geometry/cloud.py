@@ -6,6 +6,7 @@ import numpy as np
 
 from geometry.arrays import Floats, Ints
 from geometry.errors import InputError
+from geometry.cleaning import unique_rows
 from geometry.loading import RawScan
 from geometry.scan import ScanNote
 
@@ -19,8 +20,6 @@ def clean_cloud(raw: RawScan) -> tuple[Floats, Floats, tuple[ScanNote, ...]]:
 
     Raises :class:`InputError` for fewer than a hundred different points.
     """
-    from trimesh.grouping import unique_rows
-
     size = float(np.ptp(raw.vertices, axis=0).max())
     local = (raw.vertices - raw.vertices.min(axis=0)) / max(size * 1e-7, 1e-300)
     first = np.sort(unique_rows(np.round(local).astype(np.int64))[0])
@@ -59,7 +58,7 @@ def outward_normals(points: Floats) -> Floats:
     from scipy.spatial import cKDTree
 
     _, neighbours = cKDTree(points).query(points, k=min(_NEIGHBOURS + 1, len(points)))
-    neighbours = neighbours.astype(np.int64)
+    neighbours = np.asarray(neighbours, dtype=np.int64)
     normals = np.empty_like(points)
     for start in range(0, len(points), _CHUNK):
         local = points[neighbours[start : start + _CHUNK]]
@@ -93,7 +92,7 @@ def _turned(points: Floats, normals: Floats, neighbours: Ints) -> Floats:
     roots = order[np.searchsorted(label[order], np.arange(pieces))]
     # One more node joins all roots, so that a single walk reaches every piece.
     links = coo_array((np.ones(pieces), (np.full(pieces, count), roots)), (count + 1, count + 1))
-    tree.resize(count + 1, count + 1)
+    tree.resize((count + 1, count + 1))
     _, before = breadth_first_order(tree + links.tocsr(), count, directed=False)
     parent = before[:count].astype(np.int64)
     parent[roots] = roots

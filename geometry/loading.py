@@ -58,8 +58,8 @@ def _load_with_trimesh(path: Path, kind: str) -> RawScan:
         # Without the path the reader cannot follow references to other files.
         with path.open("rb") as file:
             scene = trimesh.load_scene(file, file_type=path.suffix[1:].lower(), **options)
-    parts = [_part(scene, name) for name in scene.graph.nodes_geometry]
-    parts = [part for part in parts if part is not None]
+    found = [_part(scene, name) for name in scene.graph.nodes_geometry]
+    parts = [part for part in found if part is not None]
     unit = "m" if kind in ("GLB", "glTF") else _unit(scene) if kind == "3MF" else None
     return _joined(parts, unit)
 

@@ -110,7 +110,7 @@ def _surfels(points_mm: Floats, normals: Floats) -> Occluder:
     if len(points_mm) < 2:
         return Occluder.none()
     distance, _ = cKDTree(points_mm).query(points_mm, k=2)
-    half = _SURFEL_SIZE * float(np.median(distance[:, 1]))
+    half = _SURFEL_SIZE * float(np.median(np.asarray(distance)[:, 1]))
     # The axis least along the normal never vanishes in the cross product.
     helper = np.eye(3)[np.abs(normals).argmin(axis=1)]
     side = np.cross(normals, helper)

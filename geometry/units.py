@@ -67,8 +67,8 @@ def mm_per_unit(samples: Floats, declared: str | None) -> tuple[float, ScanNote]
             return MM_PER_UNIT[unit], ScanNote("inferred", f"units: {_NAMES[unit]}, {basis}")
     scale = _STANDARD_HEAD_MM / (head.crown - head.lower_end)
     text = (
-        f"units unknown: scaled by {scale:.4g} so that the head is {_STANDARD_HEAD_MM:.0f} mm tall; "
-        "give units or scale if you know better"
+        f"units unknown: scaled by {scale:.4g} so that the head is {_STANDARD_HEAD_MM:.0f} mm "
+        "tall; give units or scale if you know better"
     )
     return scale, ScanNote("warning", text)
 
