@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from geometry.arrays import Floats
+from geometry.arrays import Floats, Ints
 from geometry.errors import InputError
 
 DIRECTIONS = {
@@ -59,7 +59,7 @@ GLTF_AXES = Axes("+y", "+z")
 """Axes that glTF prescribes."""
 
 
-def surface_samples(vertices: Floats, faces: Floats | np.ndarray, count: int = _SAMPLES) -> Floats:
+def surface_samples(vertices: Floats, faces: Ints, count: int = _SAMPLES) -> Floats:
     """Points (N, 3) spread evenly by area, or the vertices themselves when there are no faces."""
     rng = np.random.default_rng(0)
     if len(faces) == 0:

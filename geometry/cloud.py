@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from geometry.arrays import Floats, Ints
-from geometry.errors import InputError
 from geometry.cleaning import unique_rows
+from geometry.errors import InputError
 from geometry.loading import RawScan
 from geometry.scan import ScanNote
 
@@ -91,9 +91,10 @@ def _turned(points: Floats, normals: Floats, neighbours: Ints) -> Floats:
     order = np.lexsort((-distance, label))
     roots = order[np.searchsorted(label[order], np.arange(pieces))]
     # One more node joins all roots, so that a single walk reaches every piece.
-    links = coo_array((np.ones(pieces), (np.full(pieces, count), roots)), (count + 1, count + 1))
-    tree.resize((count + 1, count + 1))
-    _, before = breadth_first_order(tree + links.tocsr(), count, directed=False)
+    links = tree.tocoo()
+    ends = np.append(links.row, np.full(pieces, count)), np.append(links.col, roots)
+    joined = coo_array((np.append(links.data, np.ones(pieces)), ends), (count + 1, count + 1))
+    _, before = breadth_first_order(joined.tocsr(), count, directed=False)
     parent = before[:count].astype(np.int64)
     parent[roots] = roots
     sign = np.where(np.einsum("ij,ij->i", normals, normals[parent]) < 0.0, -1.0, 1.0)

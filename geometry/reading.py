@@ -135,4 +135,20 @@ def _axes(samples: Floats, kind: str, options: ScanOptions) -> tuple[Axes, tuple
             "the usual ones, the shape leaves a choice" if usual else "from the shape of the head"
         )
     text = f"axes: {axes.up} is up, {axes.front} is front, {basis}"
-    return axes, (ScanNote("inferred", text),)
+    notes = (ScanNote("inferred", text),)
+    return axes, notes + (_axes_doubt(samples, axes) if options.subject == "head" else ())
+
+
+def _axes_doubt(samples: Floats, axes: Axes) -> tuple[ScanNote, ...]:
+    """A warning when the shape speaks clearly against the axes that the format prescribes."""
+    try:
+        likely, usual = infer_axes(samples)
+    except InputError:
+        return ()
+    if usual or likely == axes:
+        return ()
+    text = (
+        f"the shape looks like a head with {likely.up} up and {likely.front} front; "
+        "give up and front if that is so"
+    )
+    return (ScanNote("warning", text),)

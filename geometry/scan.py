@@ -11,6 +11,9 @@ from geometry.arrays import Floats, Ints, frozen, frozen_ints
 from geometry.errors import InputError
 from geometry.raycast import Occluder
 
+_SURFEL_SIZE = 0.75
+"""Half the width of a surfel, as a share of the median distance to the nearest neighbour."""
+
 
 @dataclass(frozen=True)
 class ScanNote:
@@ -98,10 +101,6 @@ def vertex_normals(vertices: Floats, faces: Ints) -> Floats:
     return np.where(length > 1e-30, total / np.maximum(length, 1e-30), np.array([0.0, 0.0, 1.0]))
 
 
-_SURFEL_SIZE = 0.75
-"""Half the width of a surfel, as a share of the median distance to the nearest neighbour."""
-
-
 def _surfels(points_mm: Floats, normals: Floats) -> Occluder:
     """A square for each point, square to its normal."""
     # Imported here: SciPy's trees take time that users of meshes need not pay for.
@@ -122,4 +121,4 @@ def _surfels(points_mm: Floats, normals: Floats) -> Occluder:
     faces = (first + np.array([[0, 1, 2], [0, 2, 3]])).reshape(-1, 3)
     # On a curved surface neighbouring squares stand a little proud of each other; a ray that
     # starts lower than that would end on the next square.
-    return Occluder(vertices, faces, lift_mm=1.5 * half)
+    return Occluder(vertices, faces, lift_mm=1.1 * half)

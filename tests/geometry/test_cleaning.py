@@ -7,11 +7,15 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from geometry.cleaning import clean_mesh
+from geometry.cleaning import CleanMesh, clean_mesh
 from geometry.loading import RawScan
 
 
-def ball(radius=100.0, centre=(0.0, 0.0, 0.0), subdivisions=4) -> RawScan:
+def ball(
+    radius: float = 100.0,
+    centre: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    subdivisions: int = 4,
+) -> RawScan:
     mesh = trimesh.creation.icosphere(subdivisions=subdivisions, radius=radius)
     return RawScan(
         np.asarray(mesh.vertices) + np.array(centre), np.asarray(mesh.faces, dtype=np.int64)
@@ -25,15 +29,15 @@ def both(first: RawScan, second: RawScan) -> RawScan:
     )
 
 
-def texts(mesh) -> str:
+def texts(mesh: CleanMesh) -> str:
     return " / ".join(note.text for note in mesh.notes)
 
 
-def volume(mesh) -> float:
+def volume(mesh: CleanMesh) -> float:
     return float(trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).volume)
 
 
-def test_a_sound_mesh_is_left_alone():
+def test_a_sound_mesh_is_left_alone() -> None:
     raw = ball()
     clean = clean_mesh(raw)
     assert clean.notes == ()
@@ -41,7 +45,7 @@ def test_a_sound_mesh_is_left_alone():
     assert len(clean.faces) == len(raw.faces)
 
 
-def test_split_vertices_are_welded():
+def test_split_vertices_are_welded() -> None:
     raw = ball()
     split = RawScan(
         raw.vertices[raw.faces].reshape(-1, 3), np.arange(3 * len(raw.faces)).reshape(-1, 3)
@@ -51,7 +55,7 @@ def test_split_vertices_are_welded():
     assert f"{3 * len(raw.faces) - len(raw.vertices):,} vertices" in texts(clean)
 
 
-def test_degenerate_and_duplicate_faces_are_dropped():
+def test_degenerate_and_duplicate_faces_are_dropped() -> None:
     raw = ball()
     extra = np.array([[0, 0, 1], raw.faces[3], raw.faces[7][::-1]])
     clean = clean_mesh(RawScan(raw.vertices, np.concatenate([raw.faces, extra])))
@@ -60,7 +64,7 @@ def test_degenerate_and_duplicate_faces_are_dropped():
     assert "2 duplicate faces" in texts(clean)
 
 
-def test_scatter_goes_and_eyes_stay():
+def test_scatter_goes_and_eyes_stay() -> None:
     head = ball()
     scatter = ball(radius=3.0, centre=(300.0, 0.0, 0.0), subdivisions=0)
     eye = ball(radius=10.0, centre=(30.0, -60.0, 0.0), subdivisions=1)
@@ -71,7 +75,7 @@ def test_scatter_goes_and_eyes_stay():
     assert len(kept.faces) == len(head.faces) + len(scatter.faces)
 
 
-def test_an_inside_out_mesh_is_turned():
+def test_an_inside_out_mesh_is_turned() -> None:
     raw = ball()
     clean = clean_mesh(RawScan(raw.vertices, raw.faces[:, ::-1]))
     assert volume(clean) > 0.0
@@ -80,7 +84,7 @@ def test_an_inside_out_mesh_is_turned():
 
 @settings(max_examples=15, deadline=None, derandomize=True)
 @given(seed=st.integers(0, 2**31))
-def test_random_winding_is_made_consistent(seed):
+def test_random_winding_is_made_consistent(seed: int) -> None:
     raw = ball(subdivisions=2)
     flip = np.random.default_rng(seed).random(len(raw.faces)) < 0.3
     clean = clean_mesh(
@@ -92,7 +96,7 @@ def test_random_winding_is_made_consistent(seed):
     assert f"{np.count_nonzero(flip):,} faces turned" in texts(clean) or not flip.any()
 
 
-def test_an_open_surface_faces_outward_and_says_that_it_is_open():
+def test_an_open_surface_faces_outward_and_says_that_it_is_open() -> None:
     raw = ball()
     front = raw.faces[raw.vertices[raw.faces][:, :, 1].mean(axis=1) < -20.0][:, ::-1]
     clean = clean_mesh(RawScan(raw.vertices, front))

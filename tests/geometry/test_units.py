@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +12,9 @@ from scanfiles import plain_head, real_head_path
 
 from geometry.axes import DIRECTIONS, Axes, infer_axes, surface_samples
 from geometry.errors import InputError
+from geometry.head import synthetic_head
 from geometry.reading import ScanOptions, read_scan
+from geometry.scan import Scan
 from geometry.units import MM_PER_UNIT, find_head
 
 ALL_AXES = [
@@ -21,18 +24,18 @@ ALL_AXES = [
 ]
 
 
-def texts_of(scan) -> str:
+def texts_of(scan: Scan) -> str:
     return " / ".join(note.text for note in scan.notes)
 
 
-def real_head():
+def real_head() -> Scan:
     path = real_head_path()
     if path is None:
         pytest.skip("the real head scan is absent")
     return read_scan(path)
 
 
-def test_there_are_24_axes_and_each_is_a_rotation():
+def test_there_are_24_axes_and_each_is_a_rotation() -> None:
     assert len(ALL_AXES) == 24
     for axes in ALL_AXES:
         assert np.linalg.det(axes.rotation_file_to_rig) == pytest.approx(1.0)
@@ -41,7 +44,7 @@ def test_there_are_24_axes_and_each_is_a_rotation():
 
 
 @pytest.mark.parametrize("axes", ALL_AXES, ids=lambda a: f"{a.up}{a.front}")
-def test_axes_of_a_plain_head_are_found(axes):
+def test_axes_of_a_plain_head_are_found(axes: Axes) -> None:
     head = plain_head()
     samples = surface_samples(head.vertices @ axes.rotation_file_to_rig, head.faces)
     assert infer_axes(samples)[0] == axes
@@ -49,7 +52,7 @@ def test_axes_of_a_plain_head_are_found(axes):
 
 @pytest.mark.real_scan
 @pytest.mark.parametrize("axes", ALL_AXES, ids=lambda a: f"{a.up}{a.front}")
-def test_axes_and_units_of_the_real_head_are_found(tmp_path, axes):
+def test_axes_and_units_of_the_real_head_are_found(tmp_path: Path, axes: Axes) -> None:
     upright = real_head()
     extension = "stl" if axes.up < axes.front else "obj"
     turned = trimesh.Trimesh(upright.vertices_mm @ axes.rotation_file_to_rig, upright.faces)
@@ -62,7 +65,7 @@ def test_axes_and_units_of_the_real_head_are_found(tmp_path, axes):
 
 
 @pytest.mark.real_scan
-def test_the_real_head_gets_the_size_of_a_head():
+def test_the_real_head_gets_the_size_of_a_head() -> None:
     scan = real_head()
     assert len(scan.vertices_mm) == 8844
     mesh = trimesh.Trimesh(scan.vertices_mm, scan.faces, process=False)
@@ -77,7 +80,7 @@ def test_the_real_head_gets_the_size_of_a_head():
 
 @pytest.mark.real_scan
 @pytest.mark.parametrize("tall", [True, False])
-def test_the_head_part_ends_at_the_neck_only_with_shoulders(tall):
+def test_the_head_part_ends_at_the_neck_only_with_shoulders(tall: bool) -> None:
     samples = real_head().vertices_mm
     head = find_head(samples if tall else samples[samples[:, 2] > -40.0])
     assert head.has_shoulders is tall
@@ -85,7 +88,7 @@ def test_the_head_part_ends_at_the_neck_only_with_shoulders(tall):
 
 
 @pytest.mark.parametrize("unit", sorted(MM_PER_UNIT))
-def test_units_follow_from_the_size(tmp_path, unit):
+def test_units_follow_from_the_size(tmp_path: Path, unit: str) -> None:
     head = plain_head()
     head.apply_scale(1.0 / MM_PER_UNIT[unit])
     head.export(tmp_path / "head.ply")
@@ -94,7 +97,7 @@ def test_units_follow_from_the_size(tmp_path, unit):
     assert "from the size of the head" in texts_of(scan)
 
 
-def test_gltf_is_metres_with_y_up(tmp_path):
+def test_gltf_is_metres_with_y_up(tmp_path: Path) -> None:
     head = plain_head()
     head.apply_transform(trimesh.transformations.rotation_matrix(-np.pi / 2.0, [1, 0, 0]))
     head.apply_scale(1e-3)
@@ -106,7 +109,26 @@ def test_gltf_is_metres_with_y_up(tmp_path):
     assert "glTF" in texts_of(scan)
 
 
-def test_impossible_sizes_are_scaled_with_a_warning(tmp_path):
+def test_gltf_with_other_axes_than_prescribed_is_doubted(tmp_path: Path) -> None:
+    plain_head().export(tmp_path / "head.glb")
+    scan = read_scan(tmp_path / "head.glb")
+    doubts = [note.text for note in scan.notes if "looks like a head with" in note.text]
+    assert doubts
+    assert "+z up and -y front" in doubts[0]
+
+
+@pytest.fixture(scope="module")
+def synthetic() -> Scan:
+    return synthetic_head()
+
+
+@pytest.mark.parametrize("axes", ALL_AXES, ids=lambda a: f"{a.up}{a.front}")
+def test_axes_of_the_synthetic_head_are_found(synthetic: Scan, axes: Axes) -> None:
+    turned = synthetic.vertices_mm @ axes.rotation_file_to_rig
+    assert infer_axes(surface_samples(turned, synthetic.faces))[0] == axes
+
+
+def test_impossible_sizes_are_scaled_with_a_warning(tmp_path: Path) -> None:
     head = plain_head()
     head.apply_scale(30.0)
     head.export(tmp_path / "head.ply")
@@ -115,21 +137,21 @@ def test_impossible_sizes_are_scaled_with_a_warning(tmp_path):
     assert [n.kind for n in scan.notes if "240 mm" in n.text] == ["warning"]
 
 
-def test_wrong_units_are_obeyed_with_a_warning(tmp_path):
+def test_wrong_units_are_obeyed_with_a_warning(tmp_path: Path) -> None:
     plain_head().export(tmp_path / "head.ply")
     scan = read_scan(tmp_path / "head.ply", ScanOptions(units="inch"))
     assert scan.extents_mm == pytest.approx(25.4 * plain_head().extents, rel=1e-4)
     assert [n.kind for n in scan.notes if "check the units" in n.text] == ["warning"]
 
 
-def test_a_scale_overrides_units(tmp_path):
+def test_a_scale_overrides_units(tmp_path: Path) -> None:
     plain_head().export(tmp_path / "head.ply")
     scan = read_scan(tmp_path / "head.ply", ScanOptions(units="m", scale=1.1))
     assert scan.extents_mm == pytest.approx(1.1 * plain_head().extents, rel=1e-4)
 
 
 @pytest.mark.parametrize("solid", ["sphere", "box", "cylinder"])
-def test_a_shape_without_a_face_asks_for_axes(tmp_path, solid):
+def test_a_shape_without_a_face_asks_for_axes(tmp_path: Path, solid: str) -> None:
     shapes = {
         "sphere": trimesh.creation.icosphere(subdivisions=4, radius=120.0),
         "box": trimesh.creation.box(extents=(150.0, 200.0, 250.0)),
@@ -142,7 +164,7 @@ def test_a_shape_without_a_face_asks_for_axes(tmp_path, solid):
     assert "up" in caught.value.remedy
 
 
-def test_one_given_direction_narrows_the_choice():
+def test_one_given_direction_narrows_the_choice() -> None:
     head = plain_head()
     samples = surface_samples(head.vertices, head.faces)
     assert infer_axes(samples, up="+z")[0] == Axes("+z", "-y")
