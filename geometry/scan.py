@@ -11,6 +11,9 @@ from geometry.arrays import Floats, Ints, frozen, frozen_ints
 from geometry.errors import InputError
 from geometry.raycast import Occluder
 
+_SURFEL_SIZE = 0.75
+"""Half the width of a surfel, as a share of the median distance to the nearest neighbour."""
+
 
 @dataclass(frozen=True)
 class ScanNote:
@@ -96,3 +99,26 @@ def vertex_normals(vertices: Floats, faces: Ints) -> Floats:
     length = np.linalg.norm(total, axis=1, keepdims=True)
     # A vertex whose faces cancel out has no direction of its own; any unit vector will do there.
     return np.where(length > 1e-30, total / np.maximum(length, 1e-30), np.array([0.0, 0.0, 1.0]))
+
+
+def _surfels(points_mm: Floats, normals: Floats) -> Occluder:
+    """A square for each point, square to its normal."""
+    # Imported here: SciPy's trees take time that users of meshes need not pay for.
+    from scipy.spatial import cKDTree
+
+    if len(points_mm) < 2:
+        return Occluder.none()
+    distance, _ = cKDTree(points_mm).query(points_mm, k=2)
+    half = _SURFEL_SIZE * float(np.median(np.asarray(distance)[:, 1]))
+    # The axis least along the normal never vanishes in the cross product.
+    helper = np.eye(3)[np.abs(normals).argmin(axis=1)]
+    side = np.cross(normals, helper)
+    side *= half / np.linalg.norm(side, axis=1, keepdims=True)
+    up = np.cross(normals, side)
+    corners = np.stack([side + up, up - side, -side - up, side - up], axis=1)
+    vertices = (points_mm[:, None] + corners).reshape(-1, 3)
+    first = 4 * np.arange(len(points_mm))[:, None, None]
+    faces = (first + np.array([[0, 1, 2], [0, 2, 3]])).reshape(-1, 3)
+    # On a curved surface neighbouring squares stand a little proud of each other; a ray that
+    # starts lower than that would end on the next square.
+    return Occluder(vertices, faces, lift_mm=1.1 * half)

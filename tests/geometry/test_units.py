@@ -1,0 +1,171 @@
+"""Units and axes: inferred from the format and from what a head looks like."""
+
+from __future__ import annotations
+
+import itertools
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from scanfiles import plain_head, real_head_path
+
+from geometry.axes import DIRECTIONS, Axes, infer_axes, surface_samples
+from geometry.errors import InputError
+from geometry.head import synthetic_head
+from geometry.reading import ScanOptions, read_scan
+from geometry.scan import Scan
+from geometry.units import MM_PER_UNIT, find_head
+
+ALL_AXES = [
+    Axes(up, front)
+    for up, front in itertools.product(DIRECTIONS, DIRECTIONS)
+    if DIRECTIONS[up] @ DIRECTIONS[front] == 0.0
+]
+
+
+def texts_of(scan: Scan) -> str:
+    return " / ".join(note.text for note in scan.notes)
+
+
+def real_head() -> Scan:
+    path = real_head_path()
+    if path is None:
+        pytest.skip("the real head scan is absent")
+    return read_scan(path)
+
+
+def test_there_are_24_axes_and_each_is_a_rotation() -> None:
+    assert len(ALL_AXES) == 24
+    for axes in ALL_AXES:
+        assert np.linalg.det(axes.rotation_file_to_rig) == pytest.approx(1.0)
+        assert axes.rotation_file_to_rig @ DIRECTIONS[axes.up] == pytest.approx([0, 0, 1])
+        assert axes.rotation_file_to_rig @ DIRECTIONS[axes.front] == pytest.approx([0, -1, 0])
+
+
+@pytest.mark.parametrize("axes", ALL_AXES, ids=lambda a: f"{a.up}{a.front}")
+def test_axes_of_a_plain_head_are_found(axes: Axes) -> None:
+    head = plain_head()
+    samples = surface_samples(head.vertices @ axes.rotation_file_to_rig, head.faces)
+    assert infer_axes(samples)[0] == axes
+
+
+@pytest.mark.real_scan
+@pytest.mark.parametrize("axes", ALL_AXES, ids=lambda a: f"{a.up}{a.front}")
+def test_axes_and_units_of_the_real_head_are_found(tmp_path: Path, axes: Axes) -> None:
+    upright = real_head()
+    extension = "stl" if axes.up < axes.front else "obj"
+    turned = trimesh.Trimesh(upright.vertices_mm @ axes.rotation_file_to_rig, upright.faces)
+    turned.export(tmp_path / f"head.{extension}")
+    scan = read_scan(tmp_path / f"head.{extension}")
+    assert f"{axes.up} is up, {axes.front} is front" in texts_of(scan)
+    assert "millimetres" in texts_of(scan)
+    # float32 in STL, eight decimals in OBJ: 1e-4 mm on 220 mm.
+    assert scan.extents_mm == pytest.approx(upright.extents_mm, abs=1e-3)
+
+
+@pytest.mark.real_scan
+def test_the_real_head_gets_the_size_of_a_head() -> None:
+    scan = real_head()
+    assert len(scan.vertices_mm) == 8844
+    mesh = trimesh.Trimesh(scan.vertices_mm, scan.faces, process=False)
+    assert mesh.is_watertight
+    assert mesh.volume > 0.0
+    assert "240 mm tall" in texts_of(scan)
+    # Men's heads are 140 to 170 mm broad above the ears; 110 mm above the neck is there.
+    high = scan.vertices_mm[:, 2].max()
+    level = scan.vertices_mm[np.abs(scan.vertices_mm[:, 2] - (high - 80.0)) < 5.0]
+    assert 140.0 < np.ptp(level[:, 0]) < 170.0
+
+
+@pytest.mark.real_scan
+@pytest.mark.parametrize("tall", [True, False])
+def test_the_head_part_ends_at_the_neck_only_with_shoulders(tall: bool) -> None:
+    samples = real_head().vertices_mm
+    head = find_head(samples if tall else samples[samples[:, 2] > -40.0])
+    assert head.has_shoulders is tall
+    assert head.crown - head.lower_end == pytest.approx(240.0, abs=8.0)
+
+
+@pytest.mark.parametrize("unit", sorted(MM_PER_UNIT))
+def test_units_follow_from_the_size(tmp_path: Path, unit: str) -> None:
+    head = plain_head()
+    head.apply_scale(1.0 / MM_PER_UNIT[unit])
+    head.export(tmp_path / "head.ply")
+    scan = read_scan(tmp_path / "head.ply")
+    assert scan.extents_mm == pytest.approx(plain_head().extents, abs=1e-2)
+    assert "from the size of the head" in texts_of(scan)
+
+
+def test_gltf_is_metres_with_y_up(tmp_path: Path) -> None:
+    head = plain_head()
+    head.apply_transform(trimesh.transformations.rotation_matrix(-np.pi / 2.0, [1, 0, 0]))
+    head.apply_scale(1e-3)
+    head.export(tmp_path / "head.glb")
+    scan = read_scan(tmp_path / "head.glb")
+    assert scan.extents_mm == pytest.approx(plain_head().extents, abs=1e-2)
+    assert scan.vertices_mm[:, 1].min() == pytest.approx(plain_head().bounds[0, 1], abs=1e-2)
+    assert "metres" in texts_of(scan)
+    assert "glTF" in texts_of(scan)
+
+
+def test_gltf_with_other_axes_than_prescribed_is_doubted(tmp_path: Path) -> None:
+    plain_head().export(tmp_path / "head.glb")
+    scan = read_scan(tmp_path / "head.glb")
+    doubts = [note.text for note in scan.notes if "looks like a head with" in note.text]
+    assert doubts
+    assert "+z up and -y front" in doubts[0]
+
+
+@pytest.fixture(scope="module")
+def synthetic() -> Scan:
+    return synthetic_head()
+
+
+@pytest.mark.parametrize("axes", ALL_AXES, ids=lambda a: f"{a.up}{a.front}")
+def test_axes_of_the_synthetic_head_are_found(synthetic: Scan, axes: Axes) -> None:
+    turned = synthetic.vertices_mm @ axes.rotation_file_to_rig
+    assert infer_axes(surface_samples(turned, synthetic.faces))[0] == axes
+
+
+def test_impossible_sizes_are_scaled_with_a_warning(tmp_path: Path) -> None:
+    head = plain_head()
+    head.apply_scale(30.0)
+    head.export(tmp_path / "head.ply")
+    scan = read_scan(tmp_path / "head.ply")
+    assert scan.extents_mm[2] == pytest.approx(240.0, abs=1.0)
+    assert [n.kind for n in scan.notes if "240 mm" in n.text] == ["warning"]
+
+
+def test_wrong_units_are_obeyed_with_a_warning(tmp_path: Path) -> None:
+    plain_head().export(tmp_path / "head.ply")
+    scan = read_scan(tmp_path / "head.ply", ScanOptions(units="inch"))
+    assert scan.extents_mm == pytest.approx(25.4 * plain_head().extents, rel=1e-4)
+    assert [n.kind for n in scan.notes if "check the units" in n.text] == ["warning"]
+
+
+def test_a_scale_overrides_units(tmp_path: Path) -> None:
+    plain_head().export(tmp_path / "head.ply")
+    scan = read_scan(tmp_path / "head.ply", ScanOptions(units="m", scale=1.1))
+    assert scan.extents_mm == pytest.approx(1.1 * plain_head().extents, rel=1e-4)
+
+
+@pytest.mark.parametrize("solid", ["sphere", "box", "cylinder"])
+def test_a_shape_without_a_face_asks_for_axes(tmp_path: Path, solid: str) -> None:
+    shapes = {
+        "sphere": trimesh.creation.icosphere(subdivisions=4, radius=120.0),
+        "box": trimesh.creation.box(extents=(150.0, 200.0, 250.0)),
+        "cylinder": trimesh.creation.cylinder(radius=80.0, height=240.0),
+    }
+    shapes[solid].export(tmp_path / "thing.stl")
+    with pytest.raises(InputError) as caught:
+        read_scan(tmp_path / "thing.stl")
+    assert caught.value.detail == "axes-unclear"
+    assert "up" in caught.value.remedy
+
+
+def test_one_given_direction_narrows_the_choice() -> None:
+    head = plain_head()
+    samples = surface_samples(head.vertices, head.faces)
+    assert infer_axes(samples, up="+z")[0] == Axes("+z", "-y")
+    assert infer_axes(samples, front="-y")[0] == Axes("+z", "-y")
