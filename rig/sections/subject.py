@@ -13,21 +13,21 @@ from geometry.face import RegionSphere as Sphere
 from geometry.preparation import SubjectOptions
 from rig.strict import StrictModel, Vector
 
-Axis = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
+Axis = Literal["auto", "+x", "-x", "+y", "-y", "+z", "-z"]
 
 
 class ScanSection(StrictModel):
-    """How to read the scan. What is not given is inferred, and the report says so."""
+    """How to read the scan. What is left at "auto" is inferred, and the report says so."""
 
-    units: Literal["mm", "cm", "m", "in"] | None = Field(
-        default=None, description="Unit of the file."
+    units: Literal["auto", "mm", "cm", "m", "inch"] = Field(
+        default="auto", description="Unit of the file."
     )
     scale: float | None = Field(
         default=None, gt=0.0, description="Millimetres per unit, instead of units."
     )
-    up: Axis | None = Field(default=None, description="Axis of the file that points up.")
-    front: Axis | None = Field(
-        default=None, description="Axis of the file that the face looks along."
+    up: Axis = Field(default="auto", description="Axis of the file that points up.")
+    front: Axis = Field(
+        default="auto", description="Axis of the file that the face looks along."
     )
     subject: Literal["head", "object"] = Field(
         default="head", description='`"head"` expects a head\'s size; `"object"` takes anything.'
@@ -100,7 +100,7 @@ class SubjectSection(StrictModel):
         """The section that describes ``options``."""
         box, sphere = options.box, options.sphere
         return cls(
-            region=options.region,
+            region=options.region,  # type: ignore[arg-type]
             box=None
             if box is None
             else RegionBox(low_mm=box.low_mm.tolist(), high_mm=box.high_mm.tolist()),
