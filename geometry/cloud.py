@@ -92,8 +92,11 @@ def _turned(points: Floats, normals: Floats, neighbours: Ints) -> Floats:
     roots = order[np.searchsorted(label[order], np.arange(pieces))]
     # One more node joins all roots, so that a single walk reaches every piece.
     links = tree.tocoo()
-    ends = np.append(links.row, np.full(pieces, count)), np.append(links.col, roots)
-    joined = coo_array((np.append(links.data, np.ones(pieces)), ends), (count + 1, count + 1))
+    rows = np.append(links.row, np.full(pieces, count)).astype(np.int64)
+    columns = np.append(links.col, roots).astype(np.int64)
+    joined = coo_array(
+        (np.append(links.data, np.ones(pieces)), (rows, columns)), (count + 1, count + 1)
+    )
     _, before = breadth_first_order(joined.tocsr(), count, directed=False)
     parent = before[:count].astype(np.int64)
     parent[roots] = roots

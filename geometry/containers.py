@@ -128,35 +128,35 @@ def _placed_faces(model: IO[bytes]) -> int:
 
     Objects made of objects made of objects can grow exponentially with the size of the file.
     """
-    from lxml import etree  # type: ignore[import-untyped]
-
-    own: dict[str, int] = {}
-    parts: dict[str, list[str]] = {}
-    items: list[str] = []
-    faces, inner = 0, []
-    tags = tuple(f"{{*}}{name}" for name in ("triangle", "component", "object", "item"))
+    total: dict[str, int] = {}
+    faces = placed = 0
     try:
-        for _, element in etree.iterparse(model, tag=tags, resolve_entities=False):
-            name = element.tag.rpartition("}")[2]
+        for name, attributes in _elements(model):
             if name == "triangle":
                 faces += 1
             elif name == "component":
-                inner.append(element.attrib["objectid"])
-            elif name == "item":
-                items.append(element.attrib["objectid"])
+                # Parts must come before the objects made of them, so no circle can be.
+                faces += total[attributes["objectid"]]
+            elif name == "object":
+                total[attributes["id"]], faces = faces, 0
             else:
-                own[element.attrib["id"]], parts[element.attrib["id"]] = faces, inner
-                faces, inner = 0, []
+                placed += total[attributes["objectid"]]
+    except KeyError as error:
+        raise format_error("3MF", "an object has a part that does not come before it") from error
+    return placed
+
+
+def _elements(model: IO[bytes]) -> Iterator[tuple[str, dict[str, str]]]:
+    """Names and attributes of the elements that place faces, each when it ends."""
+    from lxml import etree  # type: ignore[import-untyped]
+
+    tags = tuple(f"{{*}}{name}" for name in ("triangle", "component", "object", "item"))
+    try:
+        for _, element in etree.iterparse(model, tag=tags, resolve_entities=False):
+            yield element.tag.rpartition("}")[2], dict(element.attrib)
             element.clear()
-    except (etree.XMLSyntaxError, KeyError) as error:
+    except etree.XMLSyntaxError as error:
         raise format_error("3MF", "its model part is broken") from error
-    total: dict[str, int] = {}
-    # The standard demands that parts come before the objects made of them, so no circle can be.
-    for name, inner_names in parts.items():
-        if any(inner_name not in total for inner_name in inner_names):
-            raise format_error("3MF", "an object has a part that does not come before it")
-        total[name] = own[name] + sum(total[inner_name] for inner_name in inner_names)
-    return sum(total.get(item, 0) for item in items)
 
 
 def _chunks(archive: zipfile.ZipFile, entry: zipfile.ZipInfo) -> Iterator[bytes]:

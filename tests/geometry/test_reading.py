@@ -261,7 +261,8 @@ def test_a_three_mf_that_unpacks_to_too_much_is_refused(tmp_path: Path) -> None:
         '<model xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02"><resources>'
         '<object id="1"><mesh><vertices><vertex x="0" y="0" z="0"/><vertex x="1" y="0" z="0"/>'
         '<vertex x="0" y="1" z="0"/></vertices><triangles><triangle v1="0" v2="1" v3="2"/>'
-        f'</triangles></mesh></object>{nested}</resources><build><item objectid="31"/></build></model>'
+        f"</triangles></mesh></object>{nested}</resources>"
+        '<build><item objectid="31"/></build></model>'
     )
     path = tmp_path / "bomb.3mf"
     with zipfile.ZipFile(path, "w") as archive:
