@@ -139,14 +139,9 @@ def _means(scene: Scene) -> Iterator[ConstraintRow]:
             yield row(f"incidence_mean/{camera.name}", value, limit, Sense.AT_MOST, "deg", limit)
     if limits.centring is None:
         return
-    from solver.coverage import views
-
-    seen = views(scene, scene.unknowns.state(scene.start_values())).seen
     tolerance = limits.centring.tolerance_px
-    for camera, rows in zip(scene.cameras, seen, strict=True):
-        if not rows.any():
-            continue
-        local = camera.pose.to_camera(source.points_mm[rows])
+    for camera in scene.cameras:
+        local = camera.pose.to_camera(source.points_mm)
         mean = (local[:, :2] / local[:, 2:]).mean(axis=0) * camera.camera.focal_length_px
         width = float(camera.camera.image_size_px[0])
         for axis, value in zip("xy", mean, strict=True):

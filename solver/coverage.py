@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from geometry.arrays import Bools, Floats, Ints
 from geometry.camera import RigCamera
+from geometry.surface import SurfacePoints
 from solver.candidates import Candidates
 from solver.constraints.base import bound
 from solver.constraints.places import PlaceCones
@@ -95,23 +96,58 @@ def views(
     return Views(seen, framed, promises, margins.angle_deg)
 
 
-def shortfall(scene: Scene, state: NetworkState) -> float:
-    """By how much the worst coverage tier is missed on the check points; 0 when all are met."""
-    tiers = scene.limits.coverage.tiers
-    if not tiers:
-        return 0.0
-    source, limit = scene.subject.check_points, scene.limits.incidence.ray_max_deg
-    worst = 0.0
-    for position in scene.visibility_positions:
-        found = sight(
-            source, scene.subject.occluder, centres_mm(scene, state), limit, (position,)
-        ).seen
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """Coverage as it will be judged: on the check points, at the worst head position.
+
+    ``shortfall`` is the share by which the worst tier is missed, 0 when all are met;
+    ``missed`` are indices of check points that would mend it, the easiest to win first.
+    """
+
+    shortfall: float
+    missed: Ints
+
+
+def judge(scene: Scene, state: NetworkState) -> Judged:
+    """Count the views of all check points."""
+    tiers, source = scene.limits.coverage.tiers, scene.subject.check_points
+    worst, missed = 0.0, [np.zeros(0, dtype=np.int64)]
+    limit = scene.limits.incidence.ray_max_deg
+    for position in scene.visibility_positions if tiers else ():
+        found = sight(source, scene.subject.occluder, centres_mm(scene, state), limit, (position,))
+        seen = found.seen
         for i, camera in enumerate(scene.cameras):
             if camera.fixed:
-                found[i] &= in_frame(camera, position.points(source.points_mm))
-        count = found.sum(axis=0)
-        worst = max(worst, *(t.share - float((count >= t.views).mean()) for t in tiers))
-    return max(0.0, worst)
+                seen[i] &= in_frame(camera, position.points(source.points_mm))
+        count = seen.sum(axis=0)
+        for tier in tiers:
+            lack = tier.share - float((count >= tier.views).mean())
+            if lack > 0.0:
+                worst = max(worst, lack)
+                missed.append(_easiest(found.cosine, count, tier.views, lack))
+    return Judged(worst, np.unique(np.concatenate(missed)))
+
+
+def _easiest(cosine: Floats, count: Ints, views_wanted: int, lack: float) -> Ints:
+    """Check points with too few views that come nearest to having them, enough to mend the lack."""
+    poor = np.flatnonzero(count < views_wanted)
+    nth_best = np.sort(cosine[:, poor], axis=0)[-min(views_wanted, len(cosine))]
+    enough = int(np.ceil(1.5 * lack * len(count))) + 2
+    return np.asarray(poor[np.argsort(-nth_best, kind="stable")[:enough]])
+
+
+def with_points(scene: Scene, missed: Ints) -> Scene:
+    """The scene with some check points among its design points, so that they are promised views."""
+    old, extra = scene.subject.design_points, scene.subject.check_points.subset(missed)
+    known = {p.tobytes() for p in old.points_mm}
+    fresh = [k for k, p in enumerate(extra.points_mm) if p.tobytes() not in known]
+    points = SurfacePoints(
+        np.concatenate([old.points_mm, extra.points_mm[fresh]]),
+        np.concatenate([old.normals, extra.normals[fresh]]),
+    )
+    return replace(
+        scene, subject=replace(scene.subject, design_points=points), origin=scene.origin_mm
+    )
 
 
 def _facing(scene: Scene, state: NetworkState, limit_deg: float) -> Bools:

@@ -109,7 +109,7 @@ class Frame:
 
 @dataclass(frozen=True)
 class Centring:
-    """Eq 12: the mean image coordinates of the points a camera sees are zero within tolerance."""
+    """Eq 12: the mean image coordinates of the object's points are zero within tolerance."""
 
     tolerance_px: float = 0.0
 

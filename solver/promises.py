@@ -77,13 +77,17 @@ def promise(
 
     ``deficit_deg`` (n, p): by how many degrees a camera would have to swing round the point to
     see it, negative by the margin with which it does, infinite where it cannot. Views of
-    ``fixed`` (n,) cameras count but need no promise. ``earlier`` promises are kept where they
-    are nearly as good as others: rounds that promise now this view, now that, never settle.
+    ``fixed`` (n,) cameras count but need no promise. ``earlier`` promises that were kept are
+    kept on where they are nearly as good as others: rounds that promise now this view, now that,
+    never settle. Those that were broken go to another camera if one comes nearly as near.
     """
     kept = deficit_deg <= 0.0
     if earlier is not None:
         deficit_deg = deficit_deg.copy()
-        deficit_deg[earlier.camera, earlier.point] -= _LOYALTY_DEG
+        held = deficit_deg[earlier.camera, earlier.point]
+        deficit_deg[earlier.camera, earlier.point] += np.where(
+            held <= 0.0, -_LOYALTY_DEG, _LOYALTY_DEG
+        )
     wanted = wanted_views(tiers, deficit_deg, spare)
     # Fixed cameras come first where they see the point and not at all where they do not.
     order = np.where(fixed[:, None], np.where(kept, -1e3, np.inf), deficit_deg)

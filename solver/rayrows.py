@@ -108,16 +108,13 @@ def _focus(scene: Scene, camera: Ints, point: Floats) -> list[Candidates]:
     return [Candidates(block, grouped(both, side), 4)]
 
 
-def _centring(scene: Scene, seen: Bools) -> list[Candidates]:
-    free = np.array(
-        [i for i, c in enumerate(scene.cameras) if not c.fixed and seen[i].any()], dtype=np.int64
-    )
+def _centring(scene: Scene) -> list[Candidates]:
+    free = np.array([i for i, c in enumerate(scene.cameras) if not c.fixed], dtype=np.int64)
     out = []
     if scene.limits.centring is not None:
         camera = np.repeat(free, 2)
         pixels = scene.cameras[0].camera.focal_length_px
         tolerance = bound(scene.limits.centring.tolerance_px / pixels, camera)
-        share = seen[camera] / seen[camera].sum(axis=1, keepdims=True)
         component = np.tile([0, 1], len(free))
         block: Block = MeanImageCoordinate(
             "centring",
@@ -127,7 +124,6 @@ def _centring(scene: Scene, seen: Bools) -> list[Candidates]:
             tolerance,
             camera,
             component,
-            share,
             (scene.points,),
         )
         out.append(Candidates.all_of(block))
@@ -166,14 +162,14 @@ def promise_rows(scene: Scene, promises: Promises, margin_deg: float) -> Candida
 
 
 def ray_rows(
-    scene: Scene, seen: Bools, framed: Bools, promises: Promises, margin_deg: float
+    scene: Scene, framed: Bools, promises: Promises, margin_deg: float
 ) -> list[Candidates]:
-    """All candidate rows about rays for what the cameras see, or may soon see, now."""
+    """All candidate rows about rays, for the points framed and the views promised now."""
     camera, point = _extremes(scene, framed)
     rows = (
         _frame(scene, camera, point) + _depths(scene, camera, point) + _focus(scene, camera, point)
     )
-    rows += _centring(scene, seen)
+    rows += _centring(scene)
     if len(promises.point):
         rows.append(promise_rows(scene, promises, margin_deg))
     return [r for r in rows if r.block.rows]

@@ -21,9 +21,10 @@ from solver.coverage import (
     Cuts,
     Views,
     cuts_for_hidden,
+    judge,
     opening_directions,
-    shortfall,
     views,
+    with_points,
 )
 from solver.information import CovarianceCost
 from solver.placerows import place_rows
@@ -42,8 +43,9 @@ MAX_ROUNDS = 12
 MAX_HORIZON_PASSES = 4
 MAX_STEPS = 40
 MAX_PROMISE_PRICE = 1e3
-SATISFIED = 1e-6
-"""Rows count as satisfied within this, in the solver's units of order one."""
+SATISFIED = 2e-6
+"""Rows count as satisfied within this, in the solver's units of order one; polishing makes it
+less."""
 
 SETTLED = 1e-3
 """Relative gain below which another round is not worth its time."""
@@ -103,6 +105,8 @@ class _Work:
     round: int = 0
     promise_price: float = 10.0
     margins: Margins = FIRST_MARGINS
+    tolerated: float = 0.0
+    may_add: bool = True
     cuts: Cuts = field(default_factory=Cuts.none)
     seen: Views | None = None
 
@@ -139,14 +143,19 @@ def covariance_cost(scene: Scene, seen: Views, scale: float = 1.0) -> Covariance
 def all_candidates(scene: Scene, state: NetworkState, seen: Views) -> list[Candidates]:
     """Every row that the limits ask for at this state."""
     return (
-        ray_rows(scene, seen.seen, seen.framed, seen.promises, seen.margin_deg)
+        ray_rows(scene, seen.framed, seen.promises, seen.margin_deg)
         + place_rows(scene, state)
         + body_rows(scene, state)
     )
 
 
 def merit(
-    scene: Scene, values: Floats, seen: Views, rows: list[Candidates], bounds: tuple[Floats, Floats]
+    scene: Scene,
+    values: Floats,
+    seen: Views,
+    rows: list[Candidates],
+    bounds: tuple[Floats, Floats],
+    shortfall: float,
 ) -> Merit:
     """The true merit of a network whose rays are ``seen`` and whose rows are ``rows``."""
     state = scene.unknowns.state(values)
@@ -156,7 +165,7 @@ def merit(
     free = scene.unknowns.free
     out = np.maximum(bounds[0] - values, values - bounds[1])[free].max(initial=0.0)
     cost = covariance_cost(scene, seen).value(state)
-    return Merit(float(max([out, 0.0, *watched])), shortfall(scene, state), cost)
+    return Merit(float(max([out, 0.0, *watched])), shortfall, cost)
 
 
 def _solve_round(
@@ -204,20 +213,25 @@ def _level(
 ) -> tuple[Floats, Merit, Outcome, str]:
     """Rounds on one set of points until they settle; the best network of all rounds."""
     scene = work.scene
-    seen = views(scene, scene.unknowns.state(values), earlier)
+    state = scene.unknowns.state(values)
+    seen = views(scene, state, earlier)
+    rows = all_candidates(scene, state, seen)
     best: tuple[Floats, Merit, Outcome] | None = None
     why = f"the limit of {MAX_ROUNDS} rounds was reached"
     for _ in range(MAX_ROUNDS):
         work.round += 1
-        rows = all_candidates(scene, scene.unknowns.state(values), seen)
         outcome = _solve_round(work, values, seen, rows, gain, radius)
         state = scene.unknowns.state(outcome.values)
-        missing = shortfall(scene, state)
-        if missing > 0.0:
+        judged = judge(scene, state)
+        shortfall = max(0.0, judged.shortfall - work.tolerated)
+        if shortfall > 0.0:
             work.promise_price = min(2.0 * work.promise_price, MAX_PROMISE_PRICE)
-            work.margins = work.margins.wider(missing)
+            work.margins = work.margins.wider(shortfall)
+            scene = with_points(scene, judged.missed) if work.may_add else scene
+            work.scene = scene
         seen = views(scene, state, seen, work.margins)
-        now = merit(scene, outcome.values, seen, all_candidates(scene, state, seen), work.bounds)
+        rows = all_candidates(scene, state, seen)
+        now = merit(scene, outcome.values, seen, rows, work.bounds, shortfall)
         before = None if best is None else best[1]
         if now.better_than(before):
             best = (outcome.values, now, outcome)
@@ -261,7 +275,8 @@ def run_start(scene: Scene, report: Report, cancel: CancelToken, seed: int = 0) 
     iterations, rounds, radius, earlier = 0, 0, FIRST_RADIUS, None
     coarse = thinned(scene, seed)
     if coarse is not None:
-        work = _Work(coarse[0], bounds, report, cancel, scale)
+        # The thinned points lack the hard places, so coverage is settled on the full set.
+        work = _Work(coarse[0], bounds, report, cancel, scale, tolerated=0.01, may_add=False)
         values, _, outcome, why = _level(work, values, 1e-3, radius, None)
         iterations, rounds, radius = work.iterations, work.round, 0.3 * FIRST_RADIUS
         earlier = None if work.seen is None else work.seen.among(scene, coarse[1])
@@ -269,5 +284,5 @@ def run_start(scene: Scene, report: Report, cancel: CancelToken, seed: int = 0) 
         work = _Work(scene, bounds, report, cancel, scale, iterations, rounds)
         values, found, outcome, why = _level(work, values, 1e-4, radius, earlier)
     else:
-        found = merit(scene, values, views(scene, state), [], bounds)
+        found = Merit(np.inf, 1.0, np.inf)
     return StartResult(values, found, outcome, work.iterations, work.round, outcome.stopped, why)

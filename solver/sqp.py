@@ -173,7 +173,7 @@ def minimise(
         if kkt < tolerance and worst < FEASIBLE and not run.unpriced:
             converged, why = True, "the optimality conditions hold to the tolerance"
             break
-        if worst < max(FEASIBLE, 0.01 * gain_tolerance) and _idle(run.gains, gain_tolerance):
+        if worst < max(FEASIBLE, 0.005 * gain_tolerance) and _idle(run.gains, gain_tolerance):
             converged, why = (
                 True,
                 f"three steps together gained less than {gain_tolerance:g} of the cost",

@@ -118,14 +118,13 @@ class FocusRays(Block):
 
 @dataclass(frozen=True, eq=False)
 class MeanImageCoordinate(Block):
-    """Eq 12: the mean of x/z or y/z (``component`` (m,) 0 or 1) over the points a camera sees.
+    """Eq 12: the mean of x/z or y/z (``component`` (m,) 0 or 1) over the points of the object.
 
-    ``seen`` (m, p) weights that sum to one per row, ``points`` (p, 3) for all rows together.
+    ``points`` (1,) holds one (p, 3) array for all rows.
     """
 
     camera: Ints
     component: Ints
-    seen: Floats
     points: tuple[Floats, ...]
 
     @property
@@ -133,10 +132,10 @@ class MeanImageCoordinate(Block):
         return camera_columns(self.camera, 6)
 
     def _local(self, state: NetworkState, row: int) -> tuple[Floats, Floats, Floats]:
-        """Weights, arms (q, 3) and camera coordinates (q, 3) of the points of one row."""
-        keep = np.flatnonzero(self.seen[row])
-        arm = self.points[0][keep] - state.centre[self.camera[row]]
-        return self.seen[row, keep], arm, arm @ state.rotation[self.camera[row]].T
+        """Weights (p,), arms (p, 3) and camera coordinates (p, 3) for one row."""
+        arm = self.points[0] - state.centre[self.camera[row]]
+        weight = np.full(len(arm), 1.0 / len(arm))
+        return weight, arm, arm @ state.rotation[self.camera[row]].T
 
     def value(self, state: NetworkState) -> Floats:
         out = np.empty(self.rows)

@@ -49,8 +49,6 @@ def blocks(scene: Scene) -> dict[str, Block]:
     def vectors(size: float) -> np.ndarray:
         return size * rng.normal(size=(m, 3))
 
-    seen = (rng.random((CAMERAS, len(scene.points))) < 0.7).astype(float)
-    seen /= seen.sum(axis=1, keepdims=True)
     ratio = BaseHeightRatio(**head, first=camera, second=other, centroid=vectors(0.1))
     every = np.arange(CAMERAS)
     return {
@@ -67,7 +65,6 @@ def blocks(scene: Scene) -> dict[str, Block]:
             **per_camera,
             camera=every,
             component=np.array([0, 1, 0, 1]),
-            seen=seen,
             points=(scene.points,),
         ),
         "axis_incidence": MeanAxisIncidence(
