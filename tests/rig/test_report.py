@@ -182,7 +182,7 @@ def test_figures_for_people() -> None:
     assert figure_text(-2.34567) == "−2.35"
     assert figure_text(3.2e-9, 2) == "3.2e−09"
     assert [figure_text(v) for v in (float("nan"), float("inf"), 0.0)] == ["–", "∞", "0"]
-    assert percent(1.0) == "100 %" and percent(0.99999) == "99.9 %" and percent(0.5) == "50 %"
+    assert percent(1.0) == "100 %" and percent(0.99999) == "99.99 %" and percent(0.5) == "50 %"
     assert family_words("base_height_mean_min")[0] == "Base/height, least mean"
     assert family_words("newly_invented") == ("newly invented", "")
 
