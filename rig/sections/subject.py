@@ -14,12 +14,18 @@ from rig.strict import StrictModel, Vector
 
 Axis = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
 
+INFERRED = "auto"
+"""What the reader calls an option that it is to infer; in a rig file the key is just absent."""
+
+READER_UNITS = {"mm": "mm", "cm": "cm", "m": "m", "in": "inch"}
+"""The reader's name of each unit symbol."""
+
 
 class ScanSection(StrictModel):
     """How to read the scan. What is not given is inferred, and the report says so."""
 
     units: Literal["mm", "cm", "m", "in"] | None = Field(
-        default=None, description="Unit of the file."
+        default=None, description="Unit of the file's coordinates."
     )
     scale: float | None = Field(
         default=None, gt=0.0, description="Millimetres per unit, instead of units."
@@ -34,12 +40,26 @@ class ScanSection(StrictModel):
 
     def to_options(self) -> ScanOptions:
         """The options of the scan reader."""
-        return ScanOptions(**self.model_dump())
+        return ScanOptions(
+            units=READER_UNITS[self.units] if self.units else INFERRED,
+            scale=self.scale,
+            up=self.up or INFERRED,
+            front=self.front or INFERRED,
+            subject=self.subject,
+        )
 
     @classmethod
     def from_options(cls, options: ScanOptions) -> Self:
         """The section that describes ``options``."""
-        return cls(**{key: getattr(options, key) for key in cls.model_fields})
+        units = {reader: unit for unit, reader in READER_UNITS.items()}
+        given: dict[str, object] = {
+            "units": units.get(options.units),
+            "scale": options.scale,
+            "up": None if options.up == INFERRED else options.up,
+            "front": None if options.front == INFERRED else options.front,
+            "subject": options.subject,
+        }
+        return cls.model_validate(given)
 
 
 class BoxRegion(StrictModel):
