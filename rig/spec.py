@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from geometry.reading import ScanOptions
-
 from geometry.camera import Camera, RigCamera
 from geometry.errors import InputError
 from geometry.frames import Pose
 from geometry.preparation import SubjectOptions
+from geometry.reading import ScanOptions
 from rig.contradictions import check_limits
 from solver.limits import Limits
 

@@ -100,7 +100,7 @@ def ellipsoid_figure(
                 hovertemplate="fewer than two views<extra></extra>",
             )
         )
-    figure.update_layout(**scene_layout(1.6, axes=False), showlegend=False)
+    figure.update_layout(**scene_layout(1.5, axes=False, aim_z=0.08), showlegend=False)
     # Fixed ranges: figures that fit themselves to their longest ellipsoid cannot be compared.
     ranges = {f"{axis}axis_range": [low[k], high[k]] for k, axis in enumerate("xyz")}
     figure.update_scenes(**ranges)

@@ -28,11 +28,12 @@ def figure_text(value: float, digits: int = 3) -> str:
 
 
 def percent(share: float) -> str:
-    """A share as a percentage; 100 only when it is all of them."""
+    """A share as a percentage, rounded down near 100: 100 says that it is all of them."""
     if math.isnan(share):
         return "–"
-    text = f"{100.0 * share:.1f}"
-    return "99.9 %" if text == "100.0" and share < 1.0 else f"{text.removesuffix('.0')} %"
+    if 0.99 <= share < 1.0:
+        return f"{math.floor(share * 1e4) / 100.0:.2f} %"
+    return f"{100.0 * share:.1f}".removesuffix(".0") + " %"
 
 
 def element(tag: str, content: str, **attributes: str) -> str:

@@ -88,12 +88,12 @@ class FrontView:
 
 
 def front_view(
-    occluder: Occluder, table: PointTable, lookup: RegionLookup, columns: int = 170
+    occluder: Occluder, table: PointTable, lookup: RegionLookup, columns: int = 180
 ) -> FrontView:
     """Look along +Y at the region and a margin about it."""
     points = table.points.points_mm
     low, high = points.min(axis=0), points.max(axis=0)
-    margin = 0.16 * (high - low).max()
+    margin = 0.24 * (high - low).max()
     step = (high[0] - low[0] + 2.0 * margin) / columns
     x = np.arange(low[0] - margin, high[0] + margin, step)
     z = np.arange(low[2] - margin, high[2] + margin, step)

@@ -46,10 +46,11 @@ def lines_trace(
     return go.Scatter3d(x=x, y=y, z=z, mode="lines", line=line, name=name, hoverinfo="skip", **more)
 
 
-def scene_layout(
-    zoom: float, *, axes: bool = True, eye: tuple[float, float, float] = (-0.9, -1.45, 0.45)
-) -> dict[str, Any]:
-    """A scene in true proportion, seen from the cameras' side."""
+def scene_layout(zoom: float, *, axes: bool = True, aim_z: float = -0.08) -> dict[str, Any]:
+    """A scene in true proportion, seen from the cameras' side.
+
+    ``aim_z`` is the height the viewer looks at, in units of the scene's box.
+    """
     axis = {
         "showbackground": False,
         "gridcolor": "#c9ced8",
@@ -58,7 +59,7 @@ def scene_layout(
         "nticks": 6,
         "visible": axes,
     }
-    look = np.array(eye) / zoom
+    look = np.array([-0.9, -1.45, 0.45]) / zoom
     return {
         "scene": {
             "aspectmode": "data",
@@ -67,7 +68,7 @@ def scene_layout(
             "zaxis": {**axis, "title": {"text": "Z (mm)"}},
             "camera": {
                 "eye": dict(zip("xyz", look.tolist(), strict=True)),
-                "center": {"x": 0, "y": 0, "z": -0.08},
+                "center": {"x": 0, "y": 0, "z": aim_z},
                 "up": {"x": 0, "y": 0, "z": 1},
                 "projection": {"type": "perspective"},
             },

@@ -5,29 +5,34 @@ from __future__ import annotations
 from typing import Literal, Self
 
 import numpy as np
-from geometry.reading import ScanOptions
 from pydantic import Field, model_validator
 
-from geometry.face import RegionBox as Box
-from geometry.face import RegionSphere as Sphere
+from geometry.face import RegionBox, RegionSphere
 from geometry.preparation import SubjectOptions
+from geometry.reading import ScanOptions
 from rig.strict import StrictModel, Vector
 
-Axis = Literal["auto", "+x", "-x", "+y", "-y", "+z", "-z"]
+Axis = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
+
+INFERRED = "auto"
+"""What the reader calls an option that it is to infer; in a rig file the key is just absent."""
+
+READER_UNITS = {"mm": "mm", "cm": "cm", "m": "m", "in": "inch"}
+"""The reader's name of each unit symbol."""
 
 
 class ScanSection(StrictModel):
-    """How to read the scan. What is left at "auto" is inferred, and the report says so."""
+    """How to read the scan. What is not given is inferred, and the report says so."""
 
-    units: Literal["auto", "mm", "cm", "m", "inch"] = Field(
-        default="auto", description="Unit of the file."
+    units: Literal["mm", "cm", "m", "in"] | None = Field(
+        default=None, description="Unit of the file's coordinates."
     )
     scale: float | None = Field(
         default=None, gt=0.0, description="Millimetres per unit, instead of units."
     )
-    up: Axis = Field(default="auto", description="Axis of the file that points up.")
-    front: Axis = Field(
-        default="auto", description="Axis of the file that the face looks along."
+    up: Axis | None = Field(default=None, description="Axis of the file that points up.")
+    front: Axis | None = Field(
+        default=None, description="Axis of the file that the face looks along."
     )
     subject: Literal["head", "object"] = Field(
         default="head", description='`"head"` expects a head\'s size; `"object"` takes anything.'
@@ -35,22 +40,36 @@ class ScanSection(StrictModel):
 
     def to_options(self) -> ScanOptions:
         """The options of the scan reader."""
-        return ScanOptions(**self.model_dump())
+        return ScanOptions(
+            units=READER_UNITS[self.units] if self.units else INFERRED,
+            scale=self.scale,
+            up=self.up or INFERRED,
+            front=self.front or INFERRED,
+            subject=self.subject,
+        )
 
     @classmethod
     def from_options(cls, options: ScanOptions) -> Self:
         """The section that describes ``options``."""
-        return cls(**{key: getattr(options, key) for key in cls.model_fields})
+        units = {reader: unit for unit, reader in READER_UNITS.items()}
+        given: dict[str, object] = {
+            "units": units.get(options.units),
+            "scale": options.scale,
+            "up": None if options.up == INFERRED else options.up,
+            "front": None if options.front == INFERRED else options.front,
+            "subject": options.subject,
+        }
+        return cls.model_validate(given)
 
 
-class RegionBox(StrictModel):
+class BoxRegion(StrictModel):
     """A box along the axes of the rig frame."""
 
     low_mm: Vector = Field(description="Corner with the smaller coordinates.")
     high_mm: Vector = Field(description="Corner with the greater coordinates.")
 
 
-class RegionSphere(StrictModel):
+class BallRegion(StrictModel):
     """A ball."""
 
     centre_mm: Vector = Field(description="Centre.")
@@ -65,15 +84,21 @@ class SubjectSection(StrictModel):
         description='`"face"` finds the face, `"all"` takes the whole surface, `"targets"` '
         "takes the points of the file as they are.",
     )
-    box: RegionBox | None = Field(
+    box: BoxRegion | None = Field(
         default=None, description="Take this box instead of the found region."
     )
-    sphere: RegionSphere | None = Field(default=None, description="Take this ball instead.")
-    design_points: int | None = Field(
-        default=None, ge=4, le=100_000, description="How many points steer the design."
+    sphere: BallRegion | None = Field(default=None, description="Take this ball instead.")
+    design_points: int = Field(
+        default=SubjectOptions().design_count,
+        ge=4,
+        le=100_000,
+        description="How many points steer the design.",
     )
-    check_points: int | None = Field(
-        default=None, ge=4, le=200_000, description="How many points the result is judged by."
+    check_points: int = Field(
+        default=SubjectOptions().check_count,
+        ge=4,
+        le=200_000,
+        description="How many points the result is judged by.",
     )
 
     @model_validator(mode="after")
@@ -83,30 +108,29 @@ class SubjectSection(StrictModel):
         return self
 
     def to_options(self, seed: int) -> SubjectOptions:
-        """The options of the region finder; what is not given keeps its default."""
-        given: dict[str, object] = {"region": self.region, "seed": seed}
-        if self.box is not None:
-            given["box"] = Box(np.array(self.box.low_mm), np.array(self.box.high_mm))
-        if self.sphere is not None:
-            given["sphere"] = Sphere(np.array(self.sphere.centre_mm), self.sphere.radius_mm)
-        if self.design_points is not None:
-            given["design_count"] = self.design_points
-        if self.check_points is not None:
-            given["check_count"] = self.check_points
-        return SubjectOptions(**given)  # type: ignore[arg-type]
+        """The options of the region finder."""
+        box, sphere = self.box, self.sphere
+        return SubjectOptions(
+            region=self.region,
+            box=RegionBox(np.array(box.low_mm), np.array(box.high_mm)) if box else None,
+            sphere=RegionSphere(np.array(sphere.centre_mm), sphere.radius_mm) if sphere else None,
+            design_count=self.design_points,
+            check_count=self.check_points,
+            seed=seed,
+        )
 
     @classmethod
     def from_options(cls, options: SubjectOptions) -> Self:
         """The section that describes ``options``."""
-        box, sphere = options.box, options.sphere
-        return cls(
-            region=options.region,  # type: ignore[arg-type]
-            box=None
-            if box is None
-            else RegionBox(low_mm=box.low_mm.tolist(), high_mm=box.high_mm.tolist()),
-            sphere=None
-            if sphere is None
-            else RegionSphere(centre_mm=sphere.centre_mm.tolist(), radius_mm=sphere.radius_mm),
-            design_points=options.design_count,
-            check_points=options.check_count,
-        )
+        given: dict[str, object] = {
+            "region": options.region,
+            "design_points": options.design_count,
+            "check_points": options.check_count,
+        }
+        if options.box is not None:
+            low, high = options.box.low_mm.tolist(), options.box.high_mm.tolist()
+            given["box"] = {"low_mm": low, "high_mm": high}
+        if options.sphere is not None:
+            centre, radius = options.sphere.centre_mm.tolist(), options.sphere.radius_mm
+            given["sphere"] = {"centre_mm": centre, "radius_mm": radius}
+        return cls.model_validate(given)

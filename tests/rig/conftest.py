@@ -10,9 +10,9 @@ import pytest
 
 from geometry.camera import RigCamera
 from geometry.frames import Pose
-from geometry.raycast import Occluder
+from geometry.head import synthetic_head
+from geometry.preparation import PreparedSubject, SubjectOptions, prepare_subject
 from geometry.subject import Subject
-from geometry.surface import SurfacePoints
 from rig.examples import example_rig
 from solver.quality import evaluate
 from solver.result import (
@@ -30,26 +30,14 @@ def repo() -> Path:
     return REPO
 
 
-def egg_head() -> tuple[np.ndarray, np.ndarray]:
-    """A watertight egg of 150 x 190 x 210 mm with a nose: enough of a head to look at."""
-    from trimesh.creation import icosphere
-
-    ball = icosphere(subdivisions=4)
-    vertices = np.array(ball.vertices) * [75.0, 95.0, 105.0]
-    nose = np.exp(-(((vertices[:, 0]) / 12.0) ** 2) - ((vertices[:, 2] + 10.0) / 20.0) ** 2)
-    vertices[:, 1] -= np.where(vertices[:, 1] < 0.0, 22.0 * nose, 0.0)
-    return vertices, np.array(ball.faces)
+@pytest.fixture(scope="session")
+def prepared() -> PreparedSubject:
+    return prepare_subject(synthetic_head(), SubjectOptions(design_count=200, check_count=1200))
 
 
 @pytest.fixture(scope="session")
-def subject() -> Subject:
-    import trimesh
-
-    vertices, faces = egg_head()
-    mesh = trimesh.Trimesh(vertices, faces, process=False)
-    front = mesh.vertex_normals[:, 1] < -0.45
-    points = SurfacePoints(vertices[front], mesh.vertex_normals[front])
-    return Subject(points.subset(np.arange(0, len(points), 4)), points, Occluder(vertices, faces))
+def subject(prepared: PreparedSubject) -> Subject:
+    return prepared.subject
 
 
 def ring(count: int, radius_mm: float, stand_off_mm: float) -> tuple[RigCamera, ...]:

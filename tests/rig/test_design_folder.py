@@ -8,28 +8,15 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from geometry.errors import ConflictError, InputError
 from geometry.preparation import PreparedSubject
-from geometry.scan import Scan
 from geometry.subject import Subject
 from rig.examples import example_rig
 from rig.files import FILE_NAMES, MEDIA_TYPES, check_design_folder, points_csv, write_design_folder
 from rig.layout import Layout, make_layout
 from solver.result import Design
-
-
-@pytest.fixture(scope="module")
-def prepared(subject: Subject) -> PreparedSubject:
-    vertices = subject.occluder.vertices_mm
-    normals = vertices / np.linalg.norm(vertices, axis=1, keepdims=True)
-    return prepared_subject(subject, Scan(vertices, subject.occluder.faces, normals))
-
-
-def prepared_subject(subject: Subject, scan: Scan) -> PreparedSubject:
-    return PreparedSubject(subject=subject, region=subject.check_points, scan=scan, notes=())
 
 
 @pytest.fixture(scope="module")

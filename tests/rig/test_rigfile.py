@@ -13,6 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from geometry.errors import InputError, NotFoundError
+from geometry.preparation import prepare_subject
+from geometry.reading import read_scan
 from rig.examples import example_names, example_rig, example_text
 from rig.rigfile import RigFile, parse_rig, read_rig, rig_from_mapping
 from solver.limits import Box, HalfSpace, Limits, Sphere
@@ -63,8 +65,32 @@ def test_the_wall_example_is_table_2(repo: Path) -> None:
     assert limits.centring is not None and limits.centring.tolerance_px == 0.0
     assert not limits.depth_of_field
     assert limits.body_clearance_mm is None and limits.sight_line_clearance_mm is None
-    targets = np.loadtxt(repo / "examples/wall/targets.xyz")
-    assert targets.shape == (9, 6) and (targets[:, 3:] == [0.0, -1.0, 0.0]).all()
+
+
+def test_the_wall_is_read_as_it_stands(repo: Path) -> None:
+    spec = read_rig(repo / "examples/wall/rig.toml")
+    scan = read_scan(repo / "examples/wall/targets.xyz", spec.scan_options)
+    targets = prepare_subject(scan, spec.subject_options).subject.design_points
+    assert np.allclose(targets.points_mm[0], [-19_500.0, 1200.0, 12_000.0])
+    assert len(targets) == 9 and np.allclose(targets.normals, [0.0, -1.0, 0.0])
+
+
+def test_scan_and_subject_options_come_back() -> None:
+    scan = {"units": "in", "scale": 2.5, "up": "-y", "front": "+x", "subject": "object"}
+    subject = {"region": "all", "design_points": 300, "check_points": 900}
+    box = {"low_mm": [-1, -2, -3], "high_mm": [1, 2, 3]}
+    spec = rig_from_mapping({**face(), "scan": scan, "subject": {**subject, "box": box}})
+    assert spec.scan_options.units == "inch"
+    assert spec.subject_options.design_count == 300
+    told = RigFile.from_spec(spec)
+    assert told.scan.model_dump() == scan
+    assert told.subject.box is not None and told.subject.box.high_mm == [1.0, 2.0, 3.0]
+    ball = {"centre_mm": [0, -100, 0], "radius_mm": 80}
+    spec = rig_from_mapping({**face(), "subject": {**subject, "sphere": ball}})
+    read = RigFile.from_spec(spec).subject.sphere
+    assert read is not None and read.radius_mm == 80.0
+    with pytest.raises(InputError, match="give a box or a sphere, not both"):
+        rig_from_mapping({**face(), "subject": {"box": box, "sphere": ball}})
 
 
 @pytest.mark.parametrize("name", ["face", "wall"])
