@@ -9,18 +9,11 @@ from pydantic import AwareDatetime, Field
 
 from rig.sections.subject import Axis
 from service.api.context import ServiceDep
-from service.api.models import Cursor, IdempotencyKeyHeader, Limit, Model, problems
+from service.api.models import Cursor, IdempotencyKeyHeader, Limit, Model, Note, problems
 from service.api.uploads import Upload, take_in
 from service.store.scans import ScanRecord
 
 router = APIRouter(tags=["scans"])
-
-
-class Note(Model):
-    """Something that was inferred about a scan, changed in it, or looks odd."""
-
-    kind: Literal["inferred", "changed", "warning"]
-    text: str
 
 
 class Scan(Model):

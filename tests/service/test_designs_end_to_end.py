@@ -117,6 +117,7 @@ class TestOverHttp:
         assert len(design["cameras"]) == result["cameras"] == 4
         assert design["feasible"] == result["feasible"]
         assert design["quality"]["cost_mm2"] == result["cost_mm2"]
+        assert any(note["kind"] == "inferred" for note in result["notes"])
         assert http.get(f"{own}/layout").json()["schema"] == "rigwright.layout/1"
         report = http.get(f"{own}/report")
         assert report.headers["content-type"] == "text/html; charset=utf-8"
@@ -257,6 +258,7 @@ class TestOnTheCommandLine:
         for path in out.iterdir():
             assert f"\n  {path}\n" in done.stdout
         assert "points seen by 2 or more" in done.stdout
+        assert "inferred: " in done.stdout
         own = completed["links"]["self"]
         cameras = json.loads((out / "design.json").read_text())["cameras"]
         assert cameras == http.get(f"{own}/design").json()["cameras"]
