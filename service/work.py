@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any
 
 import trimesh
-from geometry.reading import read_scan
 
 from geometry.camera import RigCamera
 from geometry.preparation import PreparedSubject, prepare_subject
+from geometry.reading import read_scan
 from geometry.scan import Scan
 from rig.designfile import evaluation_document
 from rig.files import write_design_folder
