@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any
 
 import trimesh
-from geometry.reading import read_scan
 
 from geometry.camera import RigCamera
 from geometry.preparation import PreparedSubject, prepare_subject
+from geometry.reading import read_scan
 from geometry.scan import Scan
 from rig.designfile import evaluation_document
 from rig.files import write_design_folder
@@ -79,7 +79,7 @@ def run_design(
     layout = make_layout(made.cameras, prepared.subject, spec.limits)
     write_design_folder(folder, made, layout, prepared, spec, scan_name)
     progress(Progress("done", 1.0))
-    return DesignOutcome(made, layout, prepared, design_summary(made, layout, spec.name))
+    return DesignOutcome(made, layout, prepared, design_summary(made, layout, prepared, spec.name))
 
 
 def run_evaluation(
@@ -88,7 +88,8 @@ def run_evaluation(
     """Score given cameras: the figures in short, and their document."""
     prepared = prepare_subject(read_scan(scan_path, spec.scan_options), spec.subject_options)
     quality = evaluate(prepared.subject, cameras, spec.limits)
-    return quality_summary(quality, len(cameras)), evaluation_document(cameras, quality)
+    summary = quality_summary(quality, len(cameras), prepared)
+    return summary, evaluation_document(cameras, quality)
 
 
 def write_scan(scan: Scan, path: Path) -> None:
@@ -98,7 +99,7 @@ def write_scan(scan: Scan, path: Path) -> None:
     ).export(path)
 
 
-def quality_summary(quality: Quality, cameras: int) -> JSON:
+def quality_summary(quality: Quality, cameras: int, prepared: PreparedSubject) -> JSON:
     """The figures of a network in short, as JSON data."""
     summary: JSON = plain(
         {
@@ -112,12 +113,13 @@ def quality_summary(quality: Quality, cameras: int) -> JSON:
             "in_focus_share": quality.in_focus_share,
             "in_frame_share": quality.in_frame_share,
             "violated": [row.name for row in quality.violated],
+            "notes": prepared.notes,
         }
     )
     return summary
 
 
-def design_summary(made: Design, layout: Layout, name: str) -> JSON:
+def design_summary(made: Design, layout: Layout, prepared: PreparedSubject, name: str) -> JSON:
     """A design in short, as JSON data."""
     more: JSON = plain(
         {
@@ -131,4 +133,4 @@ def design_summary(made: Design, layout: Layout, name: str) -> JSON:
             "seconds": made.solver.seconds,
         }
     )
-    return quality_summary(made.quality, len(made.cameras)) | more
+    return quality_summary(made.quality, len(made.cameras), prepared) | more

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Generic, TypeVar
+from typing import Annotated, Any, Generic, Literal, TypeVar
 
 from fastapi import Header, Query
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
@@ -43,6 +43,13 @@ class Model(BaseModel):
     """Base of everything on the wire: unknown keys are errors."""
 
     model_config = ConfigDict(extra="forbid")
+
+
+class Note(Model):
+    """Something that was inferred about a scan, changed in it, or looks odd."""
+
+    kind: Literal["inferred", "changed", "warning"]
+    text: str
 
 
 class Fault(Model):

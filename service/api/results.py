@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from service.api.models import Model
+from service.api.models import Model, Note
 
 
 class Coverage(Model):
@@ -40,6 +40,10 @@ class EvaluationResult(Model):
     in_focus_share: float | None
     in_frame_share: float | None
     violated: Annotated[list[str], Field(description="Names of the limits that are broken.")]
+    notes: Annotated[
+        list[Note],
+        Field(description="What was inferred or changed to read the scan and find the face."),
+    ]
 
 
 class DesignResult(EvaluationResult):

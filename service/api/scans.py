@@ -9,18 +9,11 @@ from pydantic import AwareDatetime, Field
 
 from rig.sections.subject import Axis
 from service.api.context import ServiceDep
-from service.api.models import Cursor, IdempotencyKeyHeader, Limit, Model, problems
+from service.api.models import Cursor, IdempotencyKeyHeader, Limit, Model, Note, problems
 from service.api.uploads import Upload, take_in
 from service.store.scans import ScanRecord
 
 router = APIRouter(tags=["scans"])
-
-
-class Note(Model):
-    """Something that was inferred about a scan, changed in it, or looks odd."""
-
-    kind: Literal["inferred", "changed", "warning"]
-    text: str
 
 
 class Scan(Model):
@@ -100,18 +93,23 @@ async def add_scan(
         ),
     ],
     units: Annotated[
-        Literal["mm", "cm", "m", "in"] | None, Query(description="Unit of the file; else inferred.")
-    ] = None,
-    up: Annotated[Axis | None, Query(description="Axis of the file that points up.")] = None,
-    front: Annotated[Axis | None, Query(description="Axis the face looks along.")] = None,
+        Literal["auto", "mm", "cm", "m", "inch"], Query(description="Unit of the file.")
+    ] = "auto",
+    up: Annotated[Axis, Query(description="Axis of the file that points up.")] = "auto",
+    front: Annotated[
+        Axis, Query(description="Axis of the file that the face looks along.")
+    ] = "auto",
     subject: Annotated[
-        Literal["head", "object"] | None, Query(description="`object` takes any size.")
-    ] = None,
+        Literal["head", "object"], Query(description="`object` takes anything, not only a head.")
+    ] = "head",
     idempotency_key: IdempotencyKeyHeader = None,
 ) -> Scan:
-    """Upload a scan. It is read before it is kept, and what was inferred or changed is told."""
+    """Upload a scan. It is read before it is kept, and what was inferred or changed is told.
+
+    What is left at `auto` is inferred.
+    """
     options = {"units": units, "up": up, "front": front, "subject": subject}
-    given = {name: value for name, value in options.items() if value is not None}
+    given = {name: value for name, value in options.items() if value not in ("auto", "head")}
     upload = Upload.announced(request, filename, given, idempotency_key)
     record, new = await take_in(service, request, upload)
     response.status_code = 201 if new else 200

@@ -22,7 +22,8 @@ def rig_for_scan(rig: RigFile, scan: ScanRecord, overrides: dict[str, Any]) -> d
     Raises :class:`~geometry.errors.InputError` when the whole makes no sense.
     """
     document = rig.model_dump(mode="json", by_alias=True, exclude_unset=True) | overrides
-    own = {key: value for key, value in document.get("scan", {}).items() if value is not None}
+    asked = document.get("scan", {})
+    own = {key: value for key, value in asked.items() if value not in (None, "auto")}
     document["scan"] = {**scan.options, **own}
     rig_from_mapping(document)
     return document

@@ -74,6 +74,7 @@ def _show(result: JSON, files: dict[str, Path], *, as_json: bool) -> None:
     else:
         from service.cli import tables
 
+        tables.print_notes(result)
         tables.print_figures(result)
         tables.print_limits(constraints)
         if result["conflicts"]:

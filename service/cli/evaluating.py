@@ -24,5 +24,6 @@ def run_evaluate_command(design_file: Path, scan: Path, rig: Path, *, as_json: b
         else:
             from service.cli import tables
 
+            tables.print_notes(result)
             tables.print_figures(result)
             tables.print_limits(document["constraints"])

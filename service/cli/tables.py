@@ -41,6 +41,13 @@ def print_figures(result: JSON) -> None:
     Console().print(table)
 
 
+def print_notes(result: JSON) -> None:
+    """What was inferred or changed to read the scan and find the face."""
+    console = Console(highlight=False)
+    for note in result["notes"]:
+        console.print(f"{note['kind']}: {note['text']}", markup=False)
+
+
 def print_limits(constraints: Iterable[JSON]) -> None:
     """The tightest row of each kind of limit."""
     tightest: dict[str, JSON] = {}

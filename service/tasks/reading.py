@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from geometry.reading import ScanOptions, read_scan
-
+from geometry.reading import read_scan
+from rig.sections.subject import ScanSection
 from solver.progress import CancelToken, ProgressCallback
 
 
@@ -20,7 +20,7 @@ def import_scan(
 ) -> dict[str, Any]:
     """Tell what is in a scan and what was inferred or changed to read it."""
     del folder, report, cancel
-    scan = read_scan(inputs["scan"], ScanOptions(**request["options"]))
+    scan = read_scan(inputs["scan"], ScanSection.model_validate(request["options"]).to_options())
     return {
         "vertices": len(scan.vertices_mm),
         "faces": len(scan.faces),

@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 from service_helpers import ROOT, StartServer
 
+from rig.sections.subject import ScanSection
 from service.api.app import make_app
 
 DOCUMENT: dict[str, Any] = make_app().openapi()
@@ -72,6 +73,17 @@ def test_errors_are_documented_as_problems_only() -> None:
                 seen += 1
                 assert list(answer["content"]) == ["application/problem+json"]
     assert seen > 30
+
+
+def test_a_scan_is_read_with_the_words_of_a_rig_file() -> None:
+    section = ScanSection.model_json_schema()["properties"]
+    parameters = DOCUMENT["paths"]["/v1/scans"]["post"]["parameters"]
+    for name in ("units", "up", "front", "subject"):
+        (given,) = [p["schema"] for p in parameters if p["name"] == name]
+        assert (given["enum"], given["default"]) == (
+            section[name]["enum"],
+            section[name]["default"],
+        )
 
 
 def test_every_operation_and_field_is_explained() -> None:
