@@ -138,6 +138,8 @@ def _easiest(cosine: Floats, count: Ints, views_wanted: int, lack: float) -> Int
 
 def with_points(scene: Scene, missed: Ints) -> Scene:
     """The scene with some check points among its design points, so that they are promised views."""
+    if len(missed) == 0:
+        return scene
     old, extra = scene.subject.design_points, scene.subject.check_points.subset(missed)
     known = {p.tobytes() for p in old.points_mm}
     fresh = [k for k, p in enumerate(extra.points_mm) if p.tobytes() not in known]

@@ -25,6 +25,7 @@ from solver.starts import kmeans_start, strips
 
 ENGINE = "sequential quadratic programming with exact second derivatives (PIQP)"
 _EXPECTED_ROUNDS = 8
+_POLISH_COST = 1.005
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +124,7 @@ def design(
     began = time.monotonic()
     tell = _Teller(progress, starts)
     tell.stage("start", 0.0)
-    jobs = _jobs(order)
+    jobs = _jobs(order, token)
     results = run_all(jobs, workers, tell.step, token)
     tell.stage("choose", 0.9)
     scores = []
@@ -178,12 +179,14 @@ class _Teller:
         self._progress(Progress("solve", self._fraction, start, iteration, cost, breach))
 
 
-def _jobs(order: Order) -> list[StartJob]:
+def _jobs(order: Order, cancel: CancelToken) -> list[StartJob]:
     """The given or the k-means start, the best strip, then jittered k-means starts."""
     subject, camera, limits, names = order.subject, order.camera, order.limits, order.names
     jobs: list[StartJob] = []
 
     def add(kind: str, cameras: tuple[RigCamera, ...]) -> None:
+        if cancel.is_set():
+            raise CancelledError
         jobs.append(StartJob(len(jobs), kind, order.scene(cameras), order.seed))
 
     if order.start is not None:
@@ -250,9 +253,11 @@ def _finish(
     scene: Scene, result: StartResult, quality: Quality, cancel: CancelToken
 ) -> tuple[Floats, Quality, float, str, int]:
     """Bring the winner to the last digit, unless that would cost it a limit."""
-    outcome = polish(scene, result.values, cancel)
+    outcome = polish(scene, result, cancel)
     polished = evaluate(scene.subject, scene.placed(outcome.values), scene.limits, scene.anchor)
-    if outcome.values is not result.values and _rank(polished) <= _rank(quality):
+    # A sharper optimum of the promised rays may cost a hair with the rays as they are.
+    worth = polished.feasible and polished.cost_mm2 <= _POLISH_COST * quality.cost_mm2
+    if worth or _rank(polished) < _rank(quality):
         return outcome.values, polished, outcome.kkt_error, outcome.why, outcome.iterations
     return result.values, quality, result.outcome.kkt_error, result.why, 0
 

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from threadpoolctl import threadpool_limits
 
-from geometry.arrays import Floats
-from solver.coverage import Cuts, cuts_for_hidden, opening_directions, views
+from solver.coverage import Cuts, cuts_for_hidden, opening_directions, views, with_points
 from solver.progress import CancelToken
-from solver.rounds import all_candidates, covariance_cost, unknown_bounds
+from solver.rounds import StartResult, all_candidates, covariance_cost, unknown_bounds
 from solver.scene import Scene
 from solver.sqp import Outcome, minimise
 from solver.sqpstate import Task
@@ -17,11 +16,12 @@ _MAX_STEPS = 120
 _TIGHT = 1e-8
 
 
-def polish(scene: Scene, values: Floats, cancel: CancelToken) -> Outcome:
-    """Solve with today's rays and promises to the optimality conditions, from ``values`` (7 n,)."""
+def polish(scene: Scene, result: StartResult, cancel: CancelToken) -> Outcome:
+    """Solve to the optimality conditions from where a start ended, with the same promises."""
     with threadpool_limits(1):
+        scene, values = with_points(scene, result.promised), result.values
         state = scene.unknowns.state(values)
-        seen = views(scene, state)
+        seen = views(scene, state, None, result.margins)
         opening = opening_directions(scene, state, seen.promises)
         cost = covariance_cost(scene, seen, covariance_cost(scene, seen).typical(state))
         rows = all_candidates(scene, state, seen)

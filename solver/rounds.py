@@ -81,7 +81,11 @@ class Merit:
 
 @dataclass(frozen=True, eq=False)
 class StartResult:
-    """What came of one start: unknowns (7 n,), merit and how it went."""
+    """What came of one start: unknowns (7 n,), merit and how it went.
+
+    ``promised`` are check points that had to be promised views by name, ``margins`` what was
+    promised beyond the limits: whoever goes on from here has to promise the same.
+    """
 
     values: Floats
     merit: Merit
@@ -90,6 +94,8 @@ class StartResult:
     rounds: int
     stopped: bool
     why: str
+    promised: Ints
+    margins: Margins
 
 
 @dataclass(eq=False)
@@ -107,6 +113,7 @@ class _Work:
     margins: Margins = FIRST_MARGINS
     tolerated: float = 0.0
     may_add: bool = True
+    promised: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     cuts: Cuts = field(default_factory=Cuts.none)
     seen: Views | None = None
 
@@ -227,8 +234,9 @@ def _level(
         if shortfall > 0.0:
             work.promise_price = min(2.0 * work.promise_price, MAX_PROMISE_PRICE)
             work.margins = work.margins.wider(shortfall)
-            scene = with_points(scene, judged.missed) if work.may_add else scene
-            work.scene = scene
+            if work.may_add:
+                work.promised = np.union1d(work.promised, judged.missed)
+                work.scene = scene = with_points(scene, judged.missed)
         seen = views(scene, state, seen, work.margins)
         rows = all_candidates(scene, state, seen)
         now = merit(scene, outcome.values, seen, rows, work.bounds, shortfall)
@@ -285,4 +293,14 @@ def run_start(scene: Scene, report: Report, cancel: CancelToken, seed: int = 0) 
         values, found, outcome, why = _level(work, values, 1e-4, radius, earlier)
     else:
         found = Merit(np.inf, 1.0, np.inf)
-    return StartResult(values, found, outcome, work.iterations, work.round, outcome.stopped, why)
+    return StartResult(
+        values,
+        found,
+        outcome,
+        work.iterations,
+        work.round,
+        outcome.stopped,
+        why,
+        work.promised,
+        work.margins,
+    )

@@ -17,7 +17,8 @@ def place_columns(cameras: Ints) -> Ints:
 
 
 def _unit(vectors: Floats) -> tuple[Floats, Floats]:
-    length = np.linalg.norm(vectors, axis=1)
+    # Two cameras may start on one spot; any direction then leads apart.
+    length = np.maximum(np.linalg.norm(vectors, axis=1), 1e-9)
     return vectors / length[:, None], length
 
 

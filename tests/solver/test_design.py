@@ -117,7 +117,8 @@ def test_progress_never_falls_and_ends_at_one() -> None:
 def test_fixed_cameras_stay_and_count() -> None:
     subject = rigs.face()
     pose = Pose.looking_at(np.array([0.0, -1000.0, 0.0]), subject.design_points.centroid_mm)
-    old = replace(camera_at(rigs.compact_camera(), "old", pose, np.zeros(3)), fixed=True)
+    camera = rigs.compact_camera(focus_distance_mm=960.0)
+    old = replace(camera_at(camera, "old", pose, np.zeros(3)), fixed=True)
     found = place(rigs.face_limits(), count=3, fixed=(old,))
     assert found.cameras[0] is old
     assert len(found.cameras) == 4
@@ -193,7 +194,7 @@ def test_spacing_and_symmetry_of_eqs_13_to_15() -> None:
 
 def test_contradicting_limits_are_named_with_what_each_would_have_to_give() -> None:
     limits = rigs.face_limits(
-        stand_off=StandOff(400.0, 600.0),
+        stand_off=StandOff(400.0, 450.0),
         base_height=BaseHeight(min=0.15),
         coverage=replace(rigs.face_limits().coverage, tiers=()),
     )
@@ -201,12 +202,12 @@ def test_contradicting_limits_are_named_with_what_each_would_have_to_give() -> N
     assert found.solver.status is Status.INFEASIBLE
     assert not found.feasible
     named = {c.family: c for c in found.solver.conflicts}
-    # 600 mm away the ellipsoid's depth of about 100 mm cannot be sharp at f/16 and 2 px.
+    # 450 mm away the depth of the ellipsoid cannot be sharp at f/16 and 2 px, nor fit the frame.
     assert {"stand_off_max", "depth_of_field"} & set(named)
     assert any(c.give > 0.0 for c in named.values())
     alone = named["stand_off_max"].give_alone
     assert alone is not None
-    wider = replace(limits, stand_off=StandOff(400.0, 600.0 + 1.1 * alone))
+    wider = replace(limits, stand_off=StandOff(400.0, 450.0 + 1.2 * alone))
     assert place(wider).feasible
 
 
