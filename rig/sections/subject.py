@@ -12,54 +12,31 @@ from geometry.preparation import SubjectOptions
 from geometry.reading import ScanOptions
 from rig.strict import StrictModel, Vector
 
-Axis = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
-
-INFERRED = "auto"
-"""What the reader calls an option that it is to infer; in a rig file the key is just absent."""
-
-READER_UNITS = {"mm": "mm", "cm": "cm", "m": "m", "in": "inch"}
-"""The reader's name of each unit symbol."""
+Axis = Literal["auto", "+x", "-x", "+y", "-y", "+z", "-z"]
+Unit = Literal["auto", "mm", "cm", "m", "inch"]
 
 
 class ScanSection(StrictModel):
-    """How to read the scan. What is not given is inferred, and the report says so."""
+    """How to read the scan. What is left at ``auto`` is inferred, and the report says so."""
 
-    units: Literal["mm", "cm", "m", "in"] | None = Field(
-        default=None, description="Unit of the file's coordinates."
-    )
+    units: Unit = Field(default="auto", description="Unit of the file's coordinates.")
     scale: float | None = Field(
         default=None, gt=0.0, description="Millimetres per unit, instead of units."
     )
-    up: Axis | None = Field(default=None, description="Axis of the file that points up.")
-    front: Axis | None = Field(
-        default=None, description="Axis of the file that the face looks along."
-    )
+    up: Axis = Field(default="auto", description="Axis of the file that points up.")
+    front: Axis = Field(default="auto", description="Axis of the file that the face looks along.")
     subject: Literal["head", "object"] = Field(
         default="head", description='`"head"` expects a head\'s size; `"object"` takes anything.'
     )
 
     def to_options(self) -> ScanOptions:
         """The options of the scan reader."""
-        return ScanOptions(
-            units=READER_UNITS[self.units] if self.units else INFERRED,
-            scale=self.scale,
-            up=self.up or INFERRED,
-            front=self.front or INFERRED,
-            subject=self.subject,
-        )
+        return ScanOptions(**self.model_dump())
 
     @classmethod
     def from_options(cls, options: ScanOptions) -> Self:
         """The section that describes ``options``."""
-        units = {reader: unit for unit, reader in READER_UNITS.items()}
-        given: dict[str, object] = {
-            "units": units.get(options.units),
-            "scale": options.scale,
-            "up": None if options.up == INFERRED else options.up,
-            "front": None if options.front == INFERRED else options.front,
-            "subject": options.subject,
-        }
-        return cls.model_validate(given)
+        return cls.model_validate({key: getattr(options, key) for key in cls.model_fields})
 
 
 class BoxRegion(StrictModel):

@@ -76,7 +76,7 @@ def test_the_wall_is_read_as_it_stands(repo: Path) -> None:
 
 
 def test_scan_and_subject_options_come_back() -> None:
-    scan = {"units": "in", "scale": 2.5, "up": "-y", "front": "+x", "subject": "object"}
+    scan = {"units": "inch", "scale": 2.5, "up": "-y", "front": "+x", "subject": "object"}
     subject = {"region": "all", "design_points": 300, "check_points": 900}
     box = {"low_mm": [-1, -2, -3], "high_mm": [1, 2, 3]}
     spec = rig_from_mapping({**face(), "scan": scan, "subject": {**subject, "box": box}})
