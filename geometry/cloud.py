@@ -12,13 +12,15 @@ from geometry.scan import ScanNote
 
 _NEIGHBOURS = 12
 _CHUNK = 200_000
-_MIN_POINTS = 100
+_MIN_POINTS = 4
+_MIN_POINTS_WITHOUT_NORMALS = 100
 
 
-def clean_cloud(raw: RawScan) -> tuple[Floats, Floats, tuple[ScanNote, ...]]:
+def clean_cloud(raw: RawScan, *, closed: bool) -> tuple[Floats, Floats, tuple[ScanNote, ...]]:
     """Points (P, 3), outward unit normals (P, 3) and notes of a scan without faces.
 
-    Raises :class:`InputError` for fewer than a hundred different points.
+    Given normals of a ``closed`` surface, such as a head's, are turned when they point inward.
+    Raises :class:`InputError` for fewer than four different points, or a hundred without normals.
     """
     size = float(np.ptp(raw.vertices, axis=0).max())
     local = (raw.vertices - raw.vertices.min(axis=0)) / max(size * 1e-7, 1e-300)
@@ -28,14 +30,15 @@ def clean_cloud(raw: RawScan) -> tuple[Floats, Floats, tuple[ScanNote, ...]]:
         text = f"{len(raw.vertices) - len(first):,} points at the same place dropped"
         notes.append(ScanNote("changed", text))
     points = raw.vertices[first]
-    if len(points) < _MIN_POINTS:
-        problem = f"the scan has {len(points)} different points; {_MIN_POINTS} are the least"
-        raise InputError("scan-too-few-points", problem, "export it again with its geometry")
     given = None if raw.normals is None else _unit(raw.normals[first])
+    least = _MIN_POINTS_WITHOUT_NORMALS if given is None else _MIN_POINTS
+    if len(points) < least:
+        problem = f"the scan has {len(points)} different points; {least} are the least"
+        raise InputError("scan-too-few-points", problem, "export it again with its geometry")
     if given is None:
         notes.append(ScanNote("inferred", f"normals: from {_NEIGHBOURS} neighbours of each point"))
         return points, outward_normals(points), tuple(notes)
-    if np.einsum("ij,ij->", given, points - points.mean(axis=0)) < 0.0:
+    if closed and np.einsum("ij,ij->", given, points - points.mean(axis=0)) < 0.0:
         notes.append(ScanNote("changed", f"{len(points):,} normals turned to point outward"))
         given = -given
     return points, given, tuple(notes)

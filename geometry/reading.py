@@ -75,7 +75,7 @@ def read_scan(path: Path, options: ScanOptions | None = None) -> Scan:
         )
         notes += mesh.notes
     else:
-        vertices, normals, cloud_notes = clean_cloud(raw)
+        vertices, normals, cloud_notes = clean_cloud(raw, closed=options.subject == "head")
         faces = raw.faces
         notes += cloud_notes
     axes, scale, frame_notes = _frame(vertices, faces, kind, raw, options)

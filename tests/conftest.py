@@ -1,0 +1,39 @@
+"""What all tests share: real data when it is there, and no skips that should not be."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+ALLOW_NO_SKIP = "RIGWRIGHT_TESTS_ALLOW_NO_SKIP"
+PROVIDED = ("needs_browser",)
+"""Marks of tests whose needs .ci/packages.txt provides."""
+
+_wrongly_skipped: list[str] = []
+
+
+@pytest.hookimpl(hookwrapper=True)
+def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]):  # type: ignore[no-untyped-def]  # noqa: ANN201, ARG001
+    outcome = yield
+    report = outcome.get_result()
+    if (
+        report.skipped
+        and os.environ.get(ALLOW_NO_SKIP)
+        and any(map(item.get_closest_marker, PROVIDED))
+    ):
+        _wrongly_skipped.append(item.nodeid)
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    if _wrongly_skipped and session.exitstatus == 0:
+        session.exitstatus = 1
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    if _wrongly_skipped:
+        terminalreporter.section("skipped although .ci/packages.txt provides what they need")
+        for name in _wrongly_skipped:
+            terminalreporter.line(name)
