@@ -13,7 +13,7 @@ from solver.sqpstate import Task
 
 _RADIUS = 0.02
 _MAX_STEPS = 120
-_TIGHT = 1e-8
+_TIGHT = 1e-6
 
 
 def polish(scene: Scene, result: StartResult, cancel: CancelToken) -> Outcome:

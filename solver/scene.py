@@ -140,8 +140,14 @@ class Scene:
             return points
 
 
-def camera_at(camera: Camera, name: str, pose: Pose, target_mm: Floats) -> RigCamera:
-    """A camera in its place, focused on the depth of ``target_mm`` unless its focus is set."""
-    depth = float(pose.axis_rig @ (target_mm - pose.position_rig_mm))
-    focus = camera.focus_distance_mm or max(camera.min_focus_distance_mm, depth)
+def camera_at(camera: Camera, name: str, pose: Pose, targets_mm: Floats) -> RigCamera:
+    """A camera in its place, focused for ``targets_mm`` (3,) or (n, 3) unless its focus is set.
+
+    The focus is the harmonic mean of the nearest and the farthest depth, where both are equally
+    sharp.
+    """
+    depths = (np.atleast_2d(targets_mm) - pose.position_rig_mm) @ pose.axis_rig
+    near, far = float(depths.min()), float(depths.max())
+    even = 2.0 * near * far / (near + far) if near > 0.0 else camera.min_focus_distance_mm
+    focus = camera.focus_distance_mm or max(camera.min_focus_distance_mm, even)
     return RigCamera(name, camera, pose, float(focus))

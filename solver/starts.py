@@ -32,14 +32,20 @@ def axis_rotation(forward: Floats) -> Floats:
 
 
 def fitting_distance(
-    camera: Camera, limits: Limits, points_mm: Floats, forward: Floats, roll_deg: float
+    camera: Camera,
+    limits: Limits,
+    points_mm: Floats,
+    forward: Floats,
+    roll_deg: float,
+    target_mm: Floats | None = None,
 ) -> float:
-    """Smallest distance from the centroid at which all points are in frame and can be in focus.
+    """Smallest distance at which all points are in frame and can be in focus.
 
-    The camera looks at the centroid along ``forward`` (3,). Within the stand-off limits.
+    The camera looks at ``target_mm``, or the centroid, from that far along ``forward`` (3,).
+    Within the stand-off limits.
     """
     rotation = look_at_rotation(np.zeros(3), forward, roll_deg)
-    middle = points_mm.mean(axis=0)
+    middle = points_mm.mean(axis=0) if target_mm is None else target_mm
     local = (points_mm - middle) @ rotation.T
     left, right, top, bottom = camera.frame_limits(
         0.0 if limits.frame is None else limits.frame.margin_px
@@ -123,7 +129,7 @@ def kmeans_start(
         distance *= 1.0 + abs(jitter * _JITTER_DISTANCE * rng.normal())
         position = centre + distance * outward
         pose = Pose(position, look_at_rotation(position, centre, roll))
-        out.append(camera_at(camera, name, pose, points.centroid_mm))
+        out.append(camera_at(camera, name, pose, points.points_mm))
     return tuple(out)
 
 
@@ -142,11 +148,10 @@ def strip(
         [np.sin(turns + heading), -np.cos(turns + heading), np.zeros(len(names))], axis=1
     )
     points = subject.check_points.points_mm
-    points = points - points.mean(axis=0) + middle
     roll = better_roll(camera, limits, points, -outward[len(names) // 2])
-    distance = max(fitting_distance(camera, limits, points, -u, roll) for u in outward)
+    distance = max(fitting_distance(camera, limits, points, -u, roll, middle) for u in outward)
     poses = [Pose(middle + distance * u, look_at_rotation(np.zeros(3), -u, roll)) for u in outward]
-    return tuple(camera_at(camera, n, p, middle) for n, p in zip(names, poses, strict=True))
+    return tuple(camera_at(camera, n, p, points) for n, p in zip(names, poses, strict=True))
 
 
 def strips(

@@ -95,11 +95,9 @@ async def add_scan(
     units: Annotated[
         Literal["auto", "mm", "cm", "m", "inch"], Query(description="Unit of the file.")
     ] = "auto",
-    up: Annotated[
-        Axis | Literal["auto"], Query(description="Axis of the file that points up.")
-    ] = "auto",
+    up: Annotated[Axis, Query(description="Axis of the file that points up.")] = "auto",
     front: Annotated[
-        Axis | Literal["auto"],
+        Axis,
         Query(description="Axis of the file that the face looks along."),
     ] = "auto",
     subject: Annotated[

@@ -144,6 +144,7 @@ def test_zones_are_respected_by_whole_bodies() -> None:
         assert (np.linalg.norm(body - [0.0, -900.0, 0.0], axis=1) >= 150.0).all()
 
 
+@pytest.mark.slow
 def test_design_holds_for_the_head_anywhere_in_its_box() -> None:
     box = MotionBox(x_mm=15.0, y_mm=10.0, z_mm=15.0, yaw_deg=5.0)
     found = place(
@@ -192,6 +193,7 @@ def test_spacing_and_symmetry_of_eqs_13_to_15() -> None:
     assert abs(row.value - 450.0) <= 5.0 + 1e-3
 
 
+@pytest.mark.slow
 def test_contradicting_limits_are_named_with_what_each_would_have_to_give() -> None:
     limits = rigs.face_limits(
         stand_off=StandOff(400.0, 450.0),
