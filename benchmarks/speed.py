@@ -42,6 +42,7 @@ GAIN = 1e-4
 """Our solver stops when three steps together gain less than this share of the cost."""
 
 RIVAL_TIME_S = 30.0
+MOST_CAMERAS_FOR_RIVALS = 9
 
 
 @dataclass(frozen=True)
@@ -198,7 +199,7 @@ def main() -> None:
         timings = [ours(task, values) for _ in range(3)]
         timing, outcome = min(timings, key=lambda t: t[0].seconds)
         rivals = ["", ""]
-        if chosen.rivals:
+        if chosen.rivals and cameras <= MOST_CAMERAS_FOR_RIVALS:
             rivals = [
                 _said(slsqp_with_differences(task, values)),
                 _said(casadi_exact(scene, task, outcome)),

@@ -109,8 +109,8 @@ def _quadratic_step(
     box_high = np.r_[np.minimum(run.radius, x_high[:free] - here), np.full(soft, np.inf)]
     # PIQP wants every row of its matrix bounded by numbers it can scale.
     solver = piqp.SparseSolver()
-    solver.settings.eps_abs = 1e-10
-    solver.settings.eps_rel = 1e-10
+    solver.settings.eps_abs = 1e-9
+    solver.settings.eps_rel = 1e-9
     quadratic = sparse.block_diag([model, sparse.csc_matrix((soft, soft))], format="csc")
     solver.setup(
         quadratic, gradient, None, None, jacobian, low - offsets, high - offsets, box_low, box_high

@@ -15,7 +15,7 @@ from solver.variables import Unknowns
 LEAST_PRICE = 0.1
 LARGEST_PRICE = 1e6
 FEASIBLE = 1e-8
-REACH = 2.0
+REACH = 1.5
 """Rows change by at most about this much per unit of the trust radius."""
 
 PATIENCE = 3

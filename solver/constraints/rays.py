@@ -169,7 +169,8 @@ class MeanImageCoordinate(Block):
             slope = multipliers[row] * self._slope(row, weight, p)
             _add_linear(out, state, k, slope.sum(axis=0), slope.T @ arm)
             by_pose = np.empty((len(arm), 3, 6))
-            by_pose[:, :, ANGLES] = np.einsum("akm,qm->qka", state.rotation_1[k], arm)
+            turned = arm @ state.rotation_1[k].transpose(2, 1, 0).reshape(3, 9)
+            by_pose[:, :, ANGLES] = turned.reshape(-1, 3, 3)
             by_pose[:, :, PLACE] = -state.rotation[k]
             lead, depth = by_pose[:, c], by_pose[:, 2]
             z = p[:, 2]
