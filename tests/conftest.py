@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-ALLOW_NO_SKIP = "RIGWRIGHT_TESTS_ALLOW_NO_SKIP"
+ALLOW_NO_SKIP = "TESTS_ALLOW_NO_SKIP"
 PROVIDED = ("needs_browser",)
 """Marks of tests whose needs .ci/packages.txt provides."""
 
