@@ -63,6 +63,22 @@ class UnsatisfiableError(RigwrightError):
     kind = "unsatisfiable"
 
 
+class DeviceError(RigwrightError):
+    """A device, or what reaches it, is missing, silent or not what it should be.
+
+    Details: ``trigger-gone``, ``trigger-wrong``, ``trigger-busy``, ``camera-gone``,
+    ``camera-not-ready``, ``backend-missing`` and further ones named where they are raised.
+    """
+
+    kind = "device"
+
+
+class InterlockError(RigwrightError):
+    """The interlock of the trigger box is open: nothing may fire."""
+
+    kind = "interlock"
+
+
 class CancelledError(RigwrightError):
     """The work was cancelled by request; nothing was written."""
 

@@ -26,6 +26,8 @@ KINDS: Mapping[str, ErrorKind] = {
     "not-found": ErrorKind(404, 2, "There is no such thing"),
     "conflict": ErrorKind(409, 2, "Not possible in the present state"),
     "unsatisfiable": ErrorKind(422, 3, "The limits cannot all be met"),
+    "device": ErrorKind(503, 4, "A device is missing or silent"),
+    "interlock": ErrorKind(423, 4, "The interlock is open"),
     "cancelled": ErrorKind(409, 130, "Cancelled by request"),
     "internal": ErrorKind(500, 1, "A fault of the program"),
 }

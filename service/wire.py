@@ -17,6 +17,8 @@ _KINDS: dict[str, type[errors.RigwrightError]] = {
         errors.NotFoundError,
         errors.ConflictError,
         errors.UnsatisfiableError,
+        errors.DeviceError,
+        errors.InterlockError,
         errors.CancelledError,
         errors.InternalError,
     )

@@ -55,7 +55,7 @@ def test_exit_codes() -> None:
     codes = {kind.kind: exit_code_of(kind("d", "p", "r")) for kind in all_errors()}
     assert codes == {
         "input": 2, "too-large": 2, "not-found": 2, "conflict": 2, "unsatisfiable": 3,
-        "cancelled": 130, "internal": 1,
+        "device": 4, "interlock": 4, "cancelled": 130, "internal": 1,
     }  # fmt: skip
 
 
