@@ -197,8 +197,11 @@ class Programme:
         """Entries of the Jacobian in the order of :attr:`jacobian_pattern`."""
         state = self.state(variables)
         parts = [np.zeros(0)]
+        known: dict[int, Floats] = {}
         for (block, rows, sign, conceding), keep in zip(self._sides, self._pattern[2], strict=True):
-            parts.append(block.jacobian(state)[rows][keep])
+            if id(block) not in known:
+                known[id(block)] = block.jacobian(state)
+            parts.append(known[id(block)][rows][keep])
             if len(conceding):
                 parts.append(np.full(len(rows), sign))
         return np.concatenate(parts)
@@ -208,14 +211,11 @@ class Programme:
         state = self.state(variables)
         size = len(self.frozen)
         full = factor * self.cost.hessian(state) if factor else np.zeros((size, size))
-        first = 0
-        for block, rows, _, _ in self._sides:
-            weights = np.zeros(block.rows)
-            weights[rows] = multipliers[first : first + len(rows)]
-            block.add_hessian(state, weights, full)
-            first += len(rows)
-        rows_, columns = self.hessian_pattern
-        return np.asarray(full[self.free[rows_], self.free[columns]])
+        for block, weights in zip(self.blocks, self.by_block(multipliers), strict=True):
+            if weights.any():
+                block.add_hessian(state, weights, full)
+        rows, columns = self.hessian_pattern
+        return np.asarray(full[self.free[rows], self.free[columns]])
 
     def hessian_matrix(self, variables: Floats, multipliers: Floats) -> Floats:
         """Hessian of the Lagrangian by the free unknowns, (free, free)."""

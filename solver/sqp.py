@@ -31,10 +31,17 @@ FIRST_RADIUS = 0.2
 
 LARGEST_RADIUS = 0.5
 SMALLEST_RADIUS = 1e-9
-FIRST_PRICE = 10.0
+FIRST_PRICE = 50.0
+QP_ACCURACY = 1e-11
+"""Of the quadratic programmes; steps to a KKT error of 1e-8 need about three digits more."""
+
 _FLAT = 0.01
 """Least curvature of a model, in start costs per squared length scale: the turn about the
 optical axis is almost free, and without any curvature such directions wander."""
+
+CORRECTIONS = 3
+"""Most second-order corrections of a step. Each costs a small part of what a new step costs, and
+rows that bend let a step be as long as the model holds, not as the rows are straight."""
 
 SETTLING = 0.01
 """Steps shorter than this are taken among rows that will bind at the solution."""
@@ -109,8 +116,8 @@ def _quadratic_step(
     box_high = np.r_[np.minimum(run.radius, x_high[:free] - here), np.full(soft, np.inf)]
     # PIQP wants every row of its matrix bounded by numbers it can scale.
     solver = piqp.SparseSolver()
-    solver.settings.eps_abs = 1e-9
-    solver.settings.eps_rel = 1e-9
+    solver.settings.eps_abs = QP_ACCURACY
+    solver.settings.eps_rel = QP_ACCURACY
     quadratic = sparse.block_diag([model, sparse.csc_matrix((soft, soft))], format="csc")
     solver.setup(
         quadratic, gradient, None, None, jacobian, low - offsets, high - offsets, box_low, box_high
@@ -223,7 +230,7 @@ def _try(
         run.price = min(run.price * 10.0, LARGEST_PRICE) if broken else run.price
         run.radius *= 0.25
         return
-    for attempt in range(2):
+    for attempt in range(1 + CORRECTIONS):
         trial, cost, breaches = _at(run, programme, step.move)
         gain = before - run.merit(cost, breaches) if np.isfinite(cost) else -np.inf
         ratio = (gain + noise) / (step.predicted + noise)
@@ -240,7 +247,7 @@ def _try(
                 run.radius = 0.5 * max(reach, 0.1 * run.radius)
             return
         run.hold_violated(trial)
-        if attempt == 0 and np.isfinite(cost):
+        if attempt < CORRECTIONS and np.isfinite(cost):
             shifted = (
                 programme.values(programme.pack(trial))
                 - jacobian @ np.r_[step.move, np.zeros(programme.concession_count)]

@@ -19,6 +19,8 @@ REACH = 1.5
 """Rows change by at most about this much per unit of the trust radius."""
 
 PATIENCE = 3
+NOTHING_LEFT = 1e-9
+"""A breach below this is a quadratic programme's rounding, not its choice."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,7 +134,7 @@ class Run:
         )
         if self.refused >= PATIENCE:
             self.price, self.refused = min(5.0 * self.price, LARGEST_PRICE), 0
-        elif self.worst < 1e-5:
+        elif self.worst < 1e-5 or left < NOTHING_LEFT:
             worth: dict[str, float] = {}
             for r, m in zip(self.task.rows, self.multipliers, strict=True):
                 worth[r.block.family] = worth.get(r.block.family, 0.0) + float(np.abs(m).sum())

@@ -163,19 +163,25 @@ class MeanImageCoordinate(Block):
         return out
 
     def add_hessian(self, state: NetworkState, multipliers: Floats, out: Floats) -> None:
-        for row in range(self.rows):
-            k, c = int(self.camera[row]), self.component[row]
-            weight, arm, p = self._local(state, row)
-            slope = multipliers[row] * self._slope(row, weight, p)
+        for k, rows in _by_camera(self.camera):
+            rows = rows[multipliers[rows] != 0.0]
+            if len(rows) == 0:
+                continue
+            # The rows of a camera are functions of the same points, so their weighted sum is one
+            # function of them, here u x/z + v y/z.
+            weight, arm, p = self._local(state, rows[0])
+            slope = sum(multipliers[row] * self._slope(row, weight, p) for row in rows)
+            pull = np.zeros(2)
+            np.add.at(pull, self.component[rows], multipliers[rows])
             _add_linear(out, state, k, slope.sum(axis=0), slope.T @ arm)
-            by_pose = np.empty((len(arm), 3, 6))
-            turned = arm @ state.rotation_1[k].transpose(2, 1, 0).reshape(3, 9)
-            by_pose[:, :, ANGLES] = turned.reshape(-1, 3, 3)
-            by_pose[:, :, PLACE] = -state.rotation[k]
-            lead, depth = by_pose[:, c], by_pose[:, 2]
-            z = p[:, 2]
-            cross = (lead * (-multipliers[row] * weight / z**2)[:, None]).T @ depth
-            own = (depth * (2.0 * multipliers[row] * weight * p[:, c] / z**3)[:, None]).T @ depth
+            by_pose = np.empty((3, len(arm), 6))
+            for axis in range(3):
+                by_pose[axis, :, ANGLES] = arm @ state.rotation_1[k][:, axis].T
+                by_pose[axis, :, PLACE] = -state.rotation[k][axis]
+            depth, z = by_pose[2], p[:, 2]
+            lead = pull[0] * by_pose[0] + pull[1] * by_pose[1]
+            cross = (lead * (-weight / z**2)[:, None]).T @ depth
+            own = (depth * (2.0 * weight * (p[:, :2] @ pull) / z**3)[:, None]).T @ depth
             at = slice(PER_CAMERA * k, PER_CAMERA * k + 6)
             out[at, at] += cross + cross.T + own
 
