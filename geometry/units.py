@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from geometry.arrays import Floats
+from geometry.errors import InputError
 from geometry.scan import ScanNote
 
 MM_PER_UNIT = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "inch": 25.4}
@@ -15,6 +16,9 @@ MM_PER_UNIT = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "inch": 25.4}
 _NAMES = {"mm": "millimetres", "cm": "centimetres", "m": "metres", "inch": "inches"}
 _HEAD_MM = (180.0, 420.0)
 _BUST_MM = (300.0, 700.0)
+_IMPOSSIBLE_MM = (25.0, 5000.0)
+"""Beyond these the unit is wrong: millimetres and metres lie a factor of 1000 apart, inches 25."""
+
 _STANDARD_HEAD_MM = 240.0
 _ROWS = 50
 _NECK_SHARE = 0.8
@@ -74,8 +78,18 @@ def mm_per_unit(samples: Floats, declared: str | None) -> tuple[float, ScanNote]
 
 
 def size_warning(extents_mm: Floats) -> tuple[ScanNote, ...]:
-    """A warning when a scan of extents (3,) has not the size of a head at the scale given."""
+    """A warning when a scan of extents (3,) has not the size of a head at the scale given.
+
+    Raises :class:`InputError` where it is so far off that the unit must be wrong: it would take
+    all memory to sample a head as large as a house at the distances that suit a face.
+    """
     size = float(np.max(extents_mm))
+    if not _IMPOSSIBLE_MM[0] <= size <= _IMPOSSIBLE_MM[1]:
+        raise InputError(
+            "scan-size",
+            f"in the units given the head is {size:.4g} mm large",
+            "give the units of the file, or leave them out to have them inferred",
+        )
     if _HEAD_MM[0] <= size <= _BUST_MM[1]:
         return ()
     text = f"at the scale given the scan is {size:.4g} mm large, which no head is; check the units"

@@ -137,11 +137,21 @@ def test_impossible_sizes_are_scaled_with_a_warning(tmp_path: Path) -> None:
     assert [n.kind for n in scan.notes if "240 mm" in n.text] == ["warning"]
 
 
-def test_wrong_units_are_obeyed_with_a_warning(tmp_path: Path) -> None:
+def test_doubtful_units_are_obeyed_with_a_warning(tmp_path: Path) -> None:
     plain_head().export(tmp_path / "head.ply")
-    scan = read_scan(tmp_path / "head.ply", ScanOptions(units="inch"))
-    assert scan.extents_mm == pytest.approx(25.4 * plain_head().extents, rel=1e-4)
+    scan = read_scan(tmp_path / "head.ply", ScanOptions(units="cm"))
+    assert scan.extents_mm == pytest.approx(10.0 * plain_head().extents, rel=1e-4)
     assert [n.kind for n in scan.notes if "check the units" in n.text] == ["warning"]
+
+
+@pytest.mark.parametrize(("units", "size"), [("m", 1.0), ("inch", 1.0), ("mm", 1e-3)])
+def test_impossible_units_are_refused(tmp_path: Path, units: str, size: float) -> None:
+    head = plain_head()
+    head.apply_scale(size)
+    head.export(tmp_path / "head.ply")
+    with pytest.raises(InputError, match="give the units") as caught:
+        read_scan(tmp_path / "head.ply", ScanOptions(units=units))
+    assert caught.value.detail == "scan-size"
 
 
 def test_a_scale_overrides_units(tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
+import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,6 +20,12 @@ from service.store.jobs import JobRecord
 T = TypeVar("T")
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
+RIGWRIGHT = [sys.executable, "-W", "error", "-m", "service.cli"]
+
+
+def rigwright(*arguments: object, **more: object) -> subprocess.CompletedProcess[str]:
+    command = [*RIGWRIGHT, *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, check=False, **more)  # type: ignore[call-overload,no-any-return]
 
 
 def wait_for(condition: Callable[[], T | None], seconds: float = 30.0) -> T:

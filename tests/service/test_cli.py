@@ -14,17 +14,10 @@ from pathlib import Path
 import httpx2
 import pytest
 import typer
-from service_helpers import HERE, files_under, wait_for
+from service_helpers import HERE, RIGWRIGHT, files_under, rigwright, wait_for
 
 from geometry.errors import CancelledError, ConflictError, InputError
 from service.cli.running import new_folder, one_line_errors, run_task
-
-RIGWRIGHT = [sys.executable, "-W", "error", "-m", "service.cli"]
-
-
-def rigwright(*arguments: object, **more: object) -> subprocess.CompletedProcess[str]:
-    command = [*RIGWRIGHT, *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, check=False, **more)  # type: ignore[call-overload,no-any-return]
 
 
 def test_help_is_quick_and_loads_no_heavy_package() -> None:

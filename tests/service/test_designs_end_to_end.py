@@ -7,7 +7,6 @@ import json
 import os
 import signal
 import subprocess
-import sys
 import time
 import tomllib
 from collections.abc import Iterator
@@ -16,7 +15,7 @@ from typing import Any
 
 import httpx2
 import pytest
-from service_helpers import LiveServer, StartServer, files_under, wait_for
+from service_helpers import RIGWRIGHT, LiveServer, StartServer, files_under, wait_for
 from starlette.testclient import TestClient
 
 from geometry.head import synthetic_head
@@ -29,7 +28,6 @@ from service.kinds import KINDS
 from service.settings import read_settings
 
 JSON = dict[str, Any]
-RIGWRIGHT = [sys.executable, "-W", "error", "-m", "service.cli"]
 TERMINAL = {"completed", "failed", "cancelled", "interrupted"}
 
 
