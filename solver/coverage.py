@@ -148,7 +148,10 @@ def with_points(scene: Scene, missed: Ints) -> Scene:
         np.concatenate([old.normals, extra.normals[fresh]]),
     )
     return replace(
-        scene, subject=replace(scene.subject, design_points=points), origin=scene.origin_mm
+        scene,
+        subject=replace(scene.subject, design_points=points),
+        origin=scene.origin_mm,
+        object_points=len(old) if scene.object_points is None else scene.object_points,
     )
 
 

@@ -124,12 +124,12 @@ def _centring(scene: Scene) -> list[Candidates]:
             tolerance,
             camera,
             component,
-            (scene.points,),
+            (scene.points[: scene.object_points],),
         )
         out.append(Candidates.all_of(block))
     if scene.limits.incidence.mean_max_deg is not None:
         limit = bound(np.radians(scene.limits.incidence.mean_max_deg), free)
-        normals = scene.subject.design_points.normals
+        normals = scene.subject.design_points.normals[: scene.object_points]
         block = MeanAxisIncidence(
             "incidence_mean", "deg", 180.0 / np.pi, bound(-_INF, free), limit, free, (normals,)
         )

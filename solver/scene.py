@@ -25,7 +25,9 @@ class Scene:
     ``anchor`` are the poses about which Eq 8 bounds the cameras, where these are not the start.
 
     Positions are divided by :attr:`length_mm`, the mean stand-off of the start, about
-    :attr:`origin_mm`, the centroid of the design points.
+    :attr:`origin_mm`, the centroid of the design points. ``object_points`` is the number of
+    leading design points that stand for the object where a limit speaks of its mean; those
+    after them were added to be promised views.
     """
 
     subject: Subject
@@ -33,6 +35,7 @@ class Scene:
     limits: Limits
     anchor: tuple[Pose, ...] | None = None
     origin: Floats | None = None
+    object_points: int | None = None
 
     @cached_property
     def origin_mm(self) -> Floats:
