@@ -41,7 +41,7 @@ class RigFile(StrictModel):
         description="How many cameras to place, fixed ones not counted. Without it: as many as "
         "there are `[[start]]` poses, or 7.",
     )
-    seed: int = Field(default=0, ge=0, le=2**63 - 1, description="Seed of everything random.")
+    seed: int = Field(default=0, ge=0, le=2**53 - 1, description="Seed of everything random.")
     starts: int = Field(default=8, ge=1, le=1000, description="How many starts to try.")
     camera: CameraSection = Field(description="The kind of camera.")
     limits: LimitsSection = Field(
