@@ -14,7 +14,7 @@ from geometry.errors import ConflictError, NotFoundError
 from service.api.context import Service, ServiceDep
 from service.api.models import Cursor, File, FileList, LastEventIdHeader, Limit, problems
 from service.problems import stored_problem
-from service.store.jobs import JobEvent, JobRecord
+from service.store.jobrecords import JobEvent, JobRecord
 
 JSON = dict[str, Any]
 _TERMINAL = ("completed", "failed", "cancelled", "interrupted")

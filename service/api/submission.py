@@ -12,7 +12,7 @@ from rig.rigfile import RigFile, rig_from_mapping
 from service.api.context import Service
 from service.api.job_routes import JobResource
 from service.store.idempotency import IdempotencyKey
-from service.store.jobs import NewJob
+from service.store.jobrecords import NewJob
 from service.store.scans import ScanRecord
 
 

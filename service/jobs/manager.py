@@ -22,7 +22,7 @@ from service import logs
 from service.jobs.bell import Bell
 from service.jobs.engine import Engine, JobKind, Task
 from service.store import Store, interrupted
-from service.store.jobs import JobRecord
+from service.store.jobrecords import JobRecord
 from service.store.tables import JobStatus
 from service.wire import error_fields
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import uuid
+from collections.abc import Collection
 from pathlib import Path
 from typing import Self
 
@@ -36,10 +37,11 @@ class Store:
 
     Opening it takes the folder's lock, brings the schema up to date and puts right what a crash
     has left. Raises :class:`~geometry.errors.ConflictError` when another service has it open,
-    :class:`InputError` when the folder cannot be used.
+    :class:`InputError` when the folder cannot be used. Jobs of the kinds in ``settled_elsewhere``
+    that ran at a crash are left as they are.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, *, settled_elsewhere: Collection[str] = ()) -> None:
         self.folder = folder
         try:
             folder.mkdir(parents=True, exist_ok=True)
@@ -65,7 +67,7 @@ class Store:
         self.jobs = Jobs(self.database, self.files)
         self.service_uuid = self.database.write(_identify)
         self._work = folder / "work"
-        self._recover()
+        self._recover(settled_elsewhere)
 
     def work_folder(self, name: str) -> Path:
         """A fresh folder for work in progress; removed when the store is next opened."""
@@ -85,10 +87,10 @@ class Store:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _recover(self) -> None:
+    def _recover(self, settled_elsewhere: Collection[str]) -> None:
         shutil.rmtree(self._work, ignore_errors=True)
         self.database.write(idempotency.forget_stale)
-        self.jobs.interrupt_running(error_fields(interrupted()))
+        self.jobs.interrupt_running(error_fields(interrupted()), but=settled_elsewhere)
         self.files.sweep(self.database.read(known_files))
 
 

@@ -7,70 +7,29 @@ crash the rows tell what was finished and what was not.
 from __future__ import annotations
 
 import uuid
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import Any
+from collections.abc import Collection, Mapping
 
-from sqlalchemy import Connection, RowMapping, delete, exists, func, insert, select, update
+from sqlalchemy import Connection, delete, exists, func, insert, select, update
 
 from geometry.errors import ConflictError, NotFoundError
 from service.store import idempotency
 from service.store.blobs import Blobs, StagedFile
 from service.store.database import Database
 from service.store.idempotency import IdempotencyKey
+from service.store.jobrecords import (
+    JSON,
+    FileRecord,
+    JobEvent,
+    JobRecord,
+    NewJob,
+    append_event,
+    end_job,
+    one_job,
+    record_of,
+    restored,
+    set_status,
+)
 from service.store.tables import JobStatus, blobs, job_events, job_files, jobs, scans, utc_now
-
-JSON = dict[str, Any]
-
-
-@dataclass(frozen=True)
-class JobRecord:
-    """A job as it stands."""
-
-    seq: int
-    id: str
-    kind: str
-    status: JobStatus
-    request: JSON
-    scan_id: str | None
-    cancel_requested: bool
-    progress: JSON | None
-    result: JSON | None
-    problem: JSON | None
-    created_at: str
-    started_at: str | None
-    ended_at: str | None
-
-
-@dataclass(frozen=True)
-class JobEvent:
-    """Something that happened to a job. ``id`` counts from 1 within the job."""
-
-    id: int
-    type: str
-    data: JSON
-    at: str
-
-
-@dataclass(frozen=True)
-class FileRecord:
-    """A file that a job left. ``path`` is where it is kept."""
-
-    name: str
-    media_type: str
-    size_bytes: int
-    sha256: str
-    path: Path
-
-
-@dataclass(frozen=True)
-class NewJob:
-    """What is asked for."""
-
-    kind: str
-    request: JSON
-    scan_id: str | None = None
 
 
 class Jobs:
@@ -98,7 +57,7 @@ class Jobs:
             if idempotency_key is not None:
                 stored = idempotency.claim(connection, idempotency_key)
                 if stored is not None:
-                    return JobRecord(**_restored(idempotency.replay(stored, request_sha256)))
+                    return JobRecord(**restored(idempotency.replay(stored, request_sha256)))
             waiting = connection.scalar(
                 select(func.count()).where(jobs.c.status == JobStatus.PENDING)
             )
@@ -114,8 +73,36 @@ class Jobs:
 
         return self._database.write(change)
 
-    def _insert(self, connection: Connection, new: NewJob) -> JobRecord:
-        job_id = str(uuid.uuid4())
+    def begin(self, new: NewJob, job_id: str) -> tuple[JobRecord, bool]:
+        """A job that runs from now on under an id that its client chose, and whether it is new.
+
+        Sent again, the same request gives the job that is there, however it ended. Raises
+        :class:`ConflictError` when the id stands for another request.
+        """
+
+        def change(connection: Connection) -> tuple[JobRecord, bool]:
+            known = connection.execute(select(jobs).where(jobs.c.id == job_id)).mappings().first()
+            if known is None:
+                return self._insert(connection, new, job_id, JobStatus.RUNNING), True
+            if (known["kind"], known["request"]) != (new.kind, new.request):
+                raise ConflictError(
+                    "id-used",
+                    f"{job_id!r} stands for another request already",
+                    "choose a new id for a new request",
+                )
+            return record_of(known), False
+
+        return self._database.write(change)
+
+    def _insert(
+        self,
+        connection: Connection,
+        new: NewJob,
+        job_id: str | None = None,
+        status: JobStatus = JobStatus.PENDING,
+    ) -> JobRecord:
+        job_id = job_id or str(uuid.uuid4())
+        now = utc_now()
         if new.scan_id is not None and not connection.scalar(
             select(exists().where(scans.c.id == new.scan_id))
         ):
@@ -126,19 +113,20 @@ class Jobs:
             insert(jobs).values(
                 id=job_id,
                 kind=new.kind,
-                status=JobStatus.PENDING,
+                status=status,
                 request=new.request,
                 scan_id=new.scan_id,
                 cancel_requested=False,
-                created_at=utc_now(),
+                created_at=now,
+                started_at=now if status is JobStatus.RUNNING else None,
             )
         )
-        _append(connection, job_id, JobStatus.PENDING, {"status": JobStatus.PENDING})
-        return _one(connection, job_id)
+        append_event(connection, job_id, status, {"status": status})
+        return one_job(connection, job_id)
 
     def get(self, job_id: str, kind: str | None = None) -> JobRecord:
         """One job, of the given kind. Raises :class:`NotFoundError`."""
-        return self._database.read(lambda connection: _one(connection, job_id, kind))
+        return self._database.read(lambda connection: one_job(connection, job_id, kind))
 
     def page(self, kind: str, limit: int, before: int | None) -> list[JobRecord]:
         """Newest first; ``before`` is the ``seq`` at which the page before ended."""
@@ -146,7 +134,7 @@ class Jobs:
         if before is not None:
             query = query.where(jobs.c.seq < before)
         return self._database.read(
-            lambda connection: [_record(row) for row in connection.execute(query).mappings()]
+            lambda connection: [record_of(row) for row in connection.execute(query).mappings()]
         )
 
     def counts(self) -> dict[JobStatus, int]:
@@ -189,8 +177,8 @@ class Jobs:
             )
             if job_id is None:
                 return None
-            _set_status(connection, job_id, JobStatus.RUNNING, {}, started_at=utc_now())
-            return _one(connection, job_id)
+            set_status(connection, job_id, JobStatus.RUNNING, {}, started_at=utc_now())
+            return one_job(connection, job_id)
 
         return self._database.write(change)
 
@@ -199,7 +187,7 @@ class Jobs:
 
         def change(connection: Connection) -> None:
             connection.execute(update(jobs).where(jobs.c.id == job_id).values(progress=progress))
-            _append(connection, job_id, "progress", progress)
+            append_event(connection, job_id, "progress", progress)
 
         self._database.write(change)
 
@@ -216,14 +204,14 @@ class Jobs:
                         job_id=job_id, name=name, blob_sha256=staged.sha256, media_type=media_type
                     )
                 )
-            _end(connection, job_id, JobStatus.COMPLETED, {"result": result}, result=result)
+            end_job(connection, job_id, JobStatus.COMPLETED, {"result": result}, result=result)
 
         self._database.write(change)
 
     def end(self, job_id: str, status: JobStatus, problem: JSON | None = None) -> None:
         """The job ended without a result."""
         self._database.write(
-            lambda connection: _end(
+            lambda connection: end_job(
                 connection, job_id, status, {"problem": problem}, problem=problem
             )
         )
@@ -235,7 +223,7 @@ class Jobs:
         """
 
         def change(connection: Connection) -> JobRecord:
-            job = _one(connection, job_id, kind)
+            job = one_job(connection, job_id, kind)
             if job.status.terminal:
                 raise ConflictError(
                     "job-ended",
@@ -246,8 +234,8 @@ class Jobs:
                 update(jobs).where(jobs.c.id == job_id).values(cancel_requested=True)
             )
             if job.status is JobStatus.PENDING:
-                _end(connection, job_id, JobStatus.CANCELLED, {})
-            return _one(connection, job_id)
+                end_job(connection, job_id, JobStatus.CANCELLED, {})
+            return one_job(connection, job_id)
 
         return self._database.write(change)
 
@@ -256,7 +244,7 @@ class Jobs:
         unused: list[str] = []
 
         def change(connection: Connection) -> None:
-            if not _one(connection, job_id, kind).status.terminal:
+            if not one_job(connection, job_id, kind).status.terminal:
                 raise ConflictError(
                     "job-active", "the job has not ended", "cancel it first, then remove it"
                 )
@@ -265,69 +253,29 @@ class Jobs:
 
         self._database.write(change, after=lambda: self._files.remove(unused))
 
-    def interrupt_running(self, problem: JSON) -> list[str]:
+    def running(self, kinds: Collection[str]) -> list[JobRecord]:
+        """The jobs of some kinds that run, or did when the service died."""
+        query = select(jobs).where(jobs.c.status == JobStatus.RUNNING, jobs.c.kind.in_(kinds))
+        return self._database.read(
+            lambda connection: [record_of(row) for row in connection.execute(query).mappings()]
+        )
+
+    def interrupt_running(self, problem: JSON, *, but: Collection[str] = ()) -> list[str]:
         """On start: jobs that ran when the service died are marked, and their ids returned.
 
-        Pending ones stay: they had not begun, and all they need is in the store.
+        Pending ones stay: they had not begun, and all they need is in the store. Those of the
+        kinds in ``but`` stay too: somebody else can still find out how they ended.
         """
 
         def change(connection: Connection) -> list[str]:
-            left = connection.scalars(select(jobs.c.id).where(jobs.c.status == JobStatus.RUNNING))
+            left = connection.scalars(
+                select(jobs.c.id).where(jobs.c.status == JobStatus.RUNNING, jobs.c.kind.not_in(but))
+            )
             ids = list(left)
             for job_id in ids:
-                _end(
+                end_job(
                     connection, job_id, JobStatus.INTERRUPTED, {"problem": problem}, problem=problem
                 )
             return ids
 
         return self._database.write(change)
-
-
-def _one(connection: Connection, job_id: str, kind: str | None = None) -> JobRecord:
-    row = connection.execute(select(jobs).where(jobs.c.id == job_id)).mappings().one_or_none()
-    if row is None or kind not in (None, row["kind"]):
-        what = kind or "job"
-        raise NotFoundError(
-            what, f"there is no {what} {job_id!r}", f"list the {what}s to see which exist"
-        )
-    return _record(row)
-
-
-def _record(row: RowMapping) -> JobRecord:
-    return replace(JobRecord(**row), status=JobStatus(row["status"]))
-
-
-def _restored(stored: JSON) -> JSON:
-    return {**stored, "status": JobStatus(stored["status"])}
-
-
-def _set_status(
-    connection: Connection,
-    job_id: str,
-    status: JobStatus,
-    event: JSON,
-    **values: Any,  # noqa: ANN401 - columns of the table
-) -> None:
-    connection.execute(update(jobs).where(jobs.c.id == job_id).values(status=status, **values))
-    _append(connection, job_id, status, {"status": status, **event})
-
-
-def _end(
-    connection: Connection,
-    job_id: str,
-    status: JobStatus,
-    event: JSON,
-    **values: Any,  # noqa: ANN401 - columns of the table
-) -> None:
-    _set_status(connection, job_id, status, event, ended_at=utc_now(), **values)
-
-
-def _append(connection: Connection, job_id: str, kind: str, data: JSON) -> None:
-    last = connection.scalar(
-        select(func.coalesce(func.max(job_events.c.id), 0)).where(job_events.c.job_id == job_id)
-    )
-    connection.execute(
-        insert(job_events).values(
-            job_id=job_id, id=(last or 0) + 1, type=str(kind), data=data, at=utc_now()
-        )
-    )

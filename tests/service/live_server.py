@@ -18,7 +18,7 @@ from service.logs import set_up_logging
 from service.server import serve
 from service.settings import read_settings
 from service.store.idempotency import IdempotencyKey
-from service.store.jobs import NewJob
+from service.store.jobrecords import NewJob
 
 
 class CountRequest(Model):

@@ -15,7 +15,7 @@ from typing import TypeVar
 import httpx2
 
 from service.store import Store
-from service.store.jobs import JobRecord
+from service.store.jobrecords import JobRecord
 
 T = TypeVar("T")
 HERE = Path(__file__).parent

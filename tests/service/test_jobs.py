@@ -18,7 +18,7 @@ from service.jobs.engine import Task
 from service.jobs.manager import JobManager
 from service.jobs.process import ProcessEngine
 from service.store import Store
-from service.store.jobs import NewJob
+from service.store.jobrecords import NewJob
 from service.store.tables import JobStatus
 from solver.progress import CancelToken, NeverCancelled
 

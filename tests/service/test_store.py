@@ -16,7 +16,7 @@ from sqlalchemy.exc import IntegrityError
 from geometry.errors import ConflictError, InputError, InternalError, NotFoundError
 from service.store import Store, idempotency
 from service.store.idempotency import IdempotencyKey
-from service.store.jobs import NewJob
+from service.store.jobrecords import NewJob
 from service.store.scans import ScanRecord, scan_identity
 from service.store.tables import JobStatus, blobs, jobs, metadata
 
@@ -311,3 +311,34 @@ class TestIdempotency:
         connection.close()
         with Store(tmp_path) as store:
             assert self.create(store, "a", "1") != first
+
+
+class TestJobsUnderAnIdTheClientChose:
+    def test_they_run_at_once_and_a_repeat_gives_the_same(self, store: Store) -> None:
+        new = NewJob("capture", {"rig": "studio"})
+        job, fresh = store.jobs.begin(new, "cap-1")
+        assert (job.id, job.status, fresh) == ("cap-1", JobStatus.RUNNING, True)
+        assert job.started_at is not None
+        assert store.jobs.claim_next() is None
+        store.jobs.complete("cap-1", {"whole": True}, {})
+        again, fresh = store.jobs.begin(new, "cap-1")
+        assert (again.status, again.result, fresh) == (JobStatus.COMPLETED, {"whole": True}, False)
+        assert [event.type for event in store.jobs.events_after("cap-1", 0)] == [
+            "running",
+            "completed",
+        ]
+
+    def test_another_request_under_the_id_is_refused(self, store: Store) -> None:
+        store.jobs.begin(NewJob("capture", {"rig": "studio"}), "cap-1")
+        for other in (NewJob("capture", {"rig": "lab"}), NewJob("self-test", {"rig": "studio"})):
+            with pytest.raises(ConflictError) as caught:
+                store.jobs.begin(other, "cap-1")
+            assert caught.value.detail == "id-used"
+
+    def test_after_a_crash_they_wait_for_whoever_knows(self, tmp_path: Path) -> None:
+        with Store(tmp_path / "data") as store:
+            store.jobs.begin(NewJob("capture", {}), "cap-1")
+            store.jobs.begin(NewJob("count", {}), "job-1")
+        with Store(tmp_path / "data", settled_elsewhere=("capture",)) as store:
+            assert store.jobs.get("job-1").status is JobStatus.INTERRUPTED
+            assert [job.id for job in store.jobs.running(("capture",))] == ["cap-1"]
