@@ -11,6 +11,7 @@ from fastapi import Depends, Request
 
 from geometry.errors import InternalError
 from service.jobs.bell import Bell
+from service.jobs.cancels import Cancels
 from service.jobs.engine import Engine, JobKind
 from service.jobs.manager import JobManager
 from service.jobs.process import ProcessEngine
@@ -30,7 +31,10 @@ class Service:
         self.store = Store(settings.data_dir)
         self.engine = engine or ProcessEngine(settings.cancel_grace_s)
         self.bell = Bell()
-        self.jobs = JobManager(self.store, self.engine, kinds, self.bell, settings.jobs_at_once)
+        self.cancels = Cancels(self.store, self.bell)
+        self.jobs = JobManager(
+            self.store, self.engine, kinds, self.bell, self.cancels, settings.jobs_at_once
+        )
         self.stopping = threading.Event()
         self.imports = CapacityLimiter(_IMPORTS_AT_ONCE)
 

@@ -107,7 +107,7 @@ class JobResource:
         )
         def cancel_job(service: ServiceDep, job_id: str) -> JSON:
             """Ask a job to stop. Asking again changes nothing; once it has ended: 409."""
-            return self.document(service.jobs.cancel(job_id, self.kind))
+            return self.document(service.cancels.cancel(job_id, self.kind))
 
         @router.delete(self.path + "/{job_id}", status_code=204, responses=problems(404, 409))
         def remove_job(service: ServiceDep, job_id: str) -> None:
