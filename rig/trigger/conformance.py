@@ -14,10 +14,10 @@ from dataclasses import dataclass, field
 from importlib.resources import files
 from typing import Any, Protocol
 
-from rig.trigger.lines import ErrorCode, LineError, LineReader, crc16
+from rig.trigger.lines import MAX_ANSWER, ErrorCode, LineError, LineReader, crc16
 from rig.trigger.protocol import SEQUENCE_MODULUS, Event, Reply, parse_answer
 
-_PLACE = re.compile(r"\{([a-z_]+)(?::([+-]\d+)|([+-]\d+))?\}")
+_PLACE = re.compile(r"\{([a-z][a-z0-9_]*)(?::([+-]\d+)|([+-]\d+))?\}")
 _CAPTURES = "abcde"
 
 
@@ -93,7 +93,7 @@ class Conversation:
     def __init__(self, stream: ByteStream, hands: Hands, prefix: str = "") -> None:
         self._stream = stream
         self._hands = hands
-        self._reader = LineReader()
+        self._reader = LineReader(MAX_ANSWER)
         self._replies: list[Reply] = []
         self._events: list[Event] = []
         self._sent: list[tuple[str, str]] = []
@@ -179,7 +179,7 @@ class Conversation:
         while not done():
             if time.monotonic() > deadline:
                 return False
-            for raw in self._reader.feed(self._stream.read(256)):
+            for raw in self._reader.feed(self._stream.read(1)):
                 try:
                     answer = parse_answer(raw)
                 except LineError as error:

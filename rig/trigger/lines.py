@@ -13,8 +13,10 @@ from enum import Enum, IntEnum
 
 from geometry.errors import InputError
 
-MAX_LINE = 95
-"""Characters before the line end."""
+MAX_REQUEST = 95
+"""Characters of a line to the box, before the line end."""
+MAX_ANSWER = 127
+"""Characters of a line from the box."""
 
 _CHECKED = re.compile(r"(.*) \*([0-9A-F]{4})")
 
@@ -65,18 +67,18 @@ def crc16(data: bytes) -> int:
     return binascii.crc_hqx(data, 0xFFFF)
 
 
-def seal(body: str) -> bytes:
+def seal(body: str, limit: int = MAX_REQUEST) -> bytes:
     """``body`` with its checksum and line end, ready for the wire.
 
     Raises :class:`~geometry.errors.InputError` for what does not fit a line.
     """
     data = body.encode("ascii", "replace")
     line = data + b" *%04X\n" % crc16(data)
-    if len(line) > MAX_LINE + 1 or not _printable(line[:-1]) or not body.isascii():
+    if len(line) > limit + 1 or not _printable(line[:-1]) or not body.isascii():
         raise InputError(
             "trigger-line",
             f"{body!r} does not fit a line of the trigger protocol",
-            f"use printable ASCII and at most {MAX_LINE - 6} characters",
+            f"use printable ASCII and at most {limit - 6} characters",
         )
     return line
 
@@ -123,7 +125,8 @@ class LineReader:
     the next line end. Empty lines are swallowed.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, limit: int = MAX_REQUEST) -> None:
+        self._limit = limit
         self._line = bytearray()
 
     def feed(self, data: bytes) -> list[RawLine]:
@@ -141,12 +144,12 @@ class LineReader:
             line = bytes(self._line).removesuffix(b"\r")
             self._line.clear()
             if line:
-                yield RawLine(line[:MAX_LINE], len(line) <= MAX_LINE and _printable(line))
+                yield RawLine(line[: self._limit], len(line) <= self._limit and _printable(line))
         self._keep(rest)
 
     def _keep(self, part: bytes) -> None:
         # Two more than fit: a full line's "\r", and one that proves the line over-long.
-        self._line += part[: MAX_LINE + 2 - len(self._line)]
+        self._line += part[: self._limit + 2 - len(self._line)]
 
 
 def _printable(line: bytes) -> bool:

@@ -10,7 +10,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from rig.trigger.lines import Check, ErrorCode, LineError, RawLine, crc16, seal, unseal
+from rig.trigger.lines import MAX_ANSWER, Check, ErrorCode, LineError, RawLine, crc16, seal, unseal
 
 SEQUENCE_MODULUS = 65536
 TICK_NS = 500
@@ -140,7 +140,10 @@ class Reply:
     def line(self) -> bytes:
         """The checked line, with its end."""
         status = ["OK"] if self.ok else ["ERR", str(self.code), self.word]
-        return seal(" ".join([self.head, *status, *(f"{k}={v}" for k, v in self.fields.items())]))
+        return seal(
+            " ".join([self.head, *status, *(f"{k}={v}" for k, v in self.fields.items())]),
+            MAX_ANSWER,
+        )
 
 
 @dataclass(frozen=True)
@@ -154,7 +157,7 @@ class Event:
     def line(self) -> bytes:
         """The checked line, with its end."""
         words = ["!", str(self.number), self.name, *(f"{k}={v}" for k, v in self.fields.items())]
-        return seal(" ".join(words))
+        return seal(" ".join(words), MAX_ANSWER)
 
 
 def parse_answer(line: RawLine) -> Reply | Event:
