@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping
 
+from rig.trigger.edges import OUTPUTS, compile_edges, nearest
 from rig.trigger.fake.device import FIRMWARE, FakeBox
-from rig.trigger.fake.edges import OUTPUTS, compile_edges, nearest
 from rig.trigger.fake.memory import Capture
 from rig.trigger.lines import ErrorCode, LineError, RawLine
 from rig.trigger.protocol import (

@@ -11,8 +11,9 @@ import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
+from rig.trigger.edges import OUTPUTS
 from rig.trigger.fake.clock import BoxClock
-from rig.trigger.fake.edges import OUTPUTS, Limits, PhysicalEdge
+from rig.trigger.fake.limits import Limits, PhysicalEdge
 from rig.trigger.fake.memory import (
     Capture,
     Captures,

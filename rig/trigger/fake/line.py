@@ -37,5 +37,9 @@ class FakeLine:
             self._out.clear()
             return said
 
+    def next_due_ns(self) -> int | None:
+        """When the box does something by itself."""
+        return self.box.next_due_ns()
+
     def _event(self, event: Event) -> None:
         self._out += event.line()

@@ -6,7 +6,7 @@ from collections import OrderedDict, deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from rig.trigger.fake.edges import OutputEdge
+from rig.trigger.edges import OutputEdge
 from rig.trigger.lines import ErrorCode
 from rig.trigger.protocol import Event
 
