@@ -62,8 +62,8 @@ class SerialTriggerBox:
         self._metrics = Metrics()
         self._keeper = Keeper(address.serial_number, self._metrics, wire_log)
         self._keeper.clock = ClockModel(address.wire_ns())
-        self._queue = JobQueue()
-        self._captures = Captures(self._keeper, lambda: self._queue.urgent)
+        self._queue: JobQueue | None = None
+        self._captures = Captures(self._keeper, self._aborting)
         self._owner: PortOwner | None = None
         self._listeners: list[Callable[[FireReport], None]] = []
         self._lock = threading.Lock()
@@ -86,7 +86,8 @@ class SerialTriggerBox:
         with self._lock:
             if self._owner is not None:
                 return
-            owner = PortOwner(self._keeper, self._captures, self._queue, self._open_line)
+            self._queue = queue = JobQueue()
+            owner = PortOwner(self._keeper, self._captures, queue, lambda: self._open_line(queue))
             self._owner = owner
         owner.start()
         try:
@@ -95,8 +96,12 @@ class SerialTriggerBox:
             self.close()
             raise
 
-    def _open_line(self) -> SerialLine:
-        return SerialLine(self.address.url, self.address.baud, self._queue.handle)
+    def _open_line(self, queue: JobQueue) -> SerialLine:
+        return SerialLine(self.address.url, self.address.baud, queue.handle)
+
+    def _aborting(self) -> bool:
+        queue = self._queue
+        return queue is not None and queue.urgent
 
     def close(self) -> None:
         """Disarm if armed, and let go of the port. Closing twice changes nothing."""
@@ -110,7 +115,6 @@ class SerialTriggerBox:
         if owner is None:
             return
         owner.stop()
-        self._queue = JobQueue()
 
     def health(self) -> TriggerHealth:
         """The present state; asks nothing of the box and never raises."""
@@ -210,9 +214,10 @@ class SerialTriggerBox:
         return end
 
     def _order(self, work: Callable[[], Any], urgent: bool = False) -> Any:  # noqa: ANN401
-        if self._owner is None:
+        queue = self._queue
+        if self._owner is None or queue is None:
             raise _closed()
-        job = self._queue.put(work, urgent)
+        job = queue.put(work, urgent)
         try:
             return job.future.result(PATIENCE_S)
         except TimeoutError:
