@@ -80,7 +80,7 @@ static avr_cycle_count_t byte_time(struct avr_t *of, avr_cycle_count_t when, voi
 {
     static avr_cycle_count_t due;
     avr_uart_t *receiver = parameter;
-    if (due > when || when - due > BYTE_CYCLES) {
+    if (due > when || when - due >= BYTE_CYCLES) {
         due = when;
     }
     receiver->cycles_per_byte = SENT_BYTE_CYCLES;
