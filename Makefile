@@ -1,6 +1,7 @@
 # make demo    set everything up and design a rig for the bundled head
 # make test    set everything up and pass the tests (the quick ones)
 # make check   lint, types, layers
+# make firmware    build the trigger box's firmware (needs gcc-avr, avr-libc)
 # make help    this list
 
 PYTHON ?= python3
@@ -9,7 +10,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 OUT ?= out/demo
 
-.PHONY: help demo test test-all check format docs benchmarks clean
+.PHONY: help firmware demo test test-all check format docs benchmarks clean
 
 help:
 	@sed -n 's/^# make/make/p' Makefile
@@ -35,6 +36,9 @@ check: $(STAMP)
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+firmware:
+	$(MAKE) -C rig/firmware
 
 format: $(STAMP)
 	$(BIN)/ruff check --fix .

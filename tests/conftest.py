@@ -9,10 +9,18 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 ALLOW_NO_SKIP = "TESTS_ALLOW_NO_SKIP"
-PROVIDED = ("needs_browser",)
+PROVIDED = ("needs_browser", "needs_avr")
 """Marks of tests whose needs .ci/packages.txt provides."""
 
 _wrongly_skipped: list[str] = []
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    for mark in (
+        "needs_avr: needs Debian's gcc-avr, avr-libc and libsimavr-dev; skipped when absent",
+        "needs_node: needs avr-gcc, and node and npm, which fetch avr8js; skipped when absent",
+    ):
+        config.addinivalue_line("markers", mark)
 
 
 @pytest.hookimpl(hookwrapper=True)
