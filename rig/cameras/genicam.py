@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -22,7 +23,7 @@ PRODUCERS = "GENICAM_GENTL64_PATH"
 class GenicamOptions(StrictModel):
     """Options of GenICam cameras."""
 
-    producers: list[str] = []
+    producers: tuple[str, ...] = ()
     """Files ``*.cti``; empty: those in the folders of ``GENICAM_GENTL64_PATH``."""
     trigger: Literal["edge", "software", "none"] = "edge"
     trigger_line: str = "Line0"
@@ -33,7 +34,7 @@ class GenicamOptions(StrictModel):
     command_deadline_s: Annotated[float, Field(gt=0, le=60)] = 2.0
 
 
-def find_producers(given: list[str]) -> list[str]:
+def find_producers(given: Sequence[str]) -> list[str]:
     """Producers to load, as absolute paths. InputError when there are none."""
     for name in given:
         if not Path(name).is_file():

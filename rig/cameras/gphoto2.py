@@ -25,7 +25,7 @@ class GphotoOptions(StrictModel):
     trigger: Literal["edge", "software"] = "edge"
     target: Literal["memory", "card"] = "memory"
     """Where the body keeps a picture until it is fetched; those on the card stay there."""
-    suffixes: list[str] = []
+    suffixes: tuple[str, ...] = ()
     """Files wanted, such as ``[".nef"]``; empty: all. Bodies may make two files per shot."""
     busy_s: Annotated[float, Field(ge=0, le=60)] = 5.0
     """How long a body may refuse USB after firing, while its focus is held."""

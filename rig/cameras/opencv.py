@@ -26,7 +26,7 @@ BY_ID = "/dev/v4l/by-id"
 class OpencvOptions(StrictModel):
     """Options of OpenCV cameras."""
 
-    sources: dict[str, str | int] = {}
+    sources: Annotated[dict[str, str | int], Field(default_factory=dict)]
     """Names for addresses, file patterns (``frames/f_%04d.png``) or, where there is nothing
     better, numbers of the system, which change when cables are moved."""
     image_size_px: tuple[int, int] | None = None

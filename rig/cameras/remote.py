@@ -26,6 +26,7 @@ from rig.cameras.base import (
     ClockSample,
     Frame,
     FrameStatus,
+    Image,
     TimestampKind,
     TriggerKind,
 )
@@ -109,8 +110,10 @@ class RemoteCamera:
         except LinkDown as error:
             link.kill()
             raise self._gone(str(error)) from None
-        except BaseException:
+        except BaseException as error:
             link.kill()
+            if isinstance(error, DeviceError) and error.detail == "camera-gone":
+                raise self._gone(error.problem) from None
             raise
         self._link, self._problem = link, ""
         return read_info(spec.backend, told["info"]), read_capabilities(told["capabilities"])
@@ -352,7 +355,7 @@ class RemoteCamera:
                 link.close()
 
 
-def _decode(told: Mapping[str, Any], payload: bytes) -> pixels.Image:
+def _decode(told: Mapping[str, Any], payload: bytes) -> Image:
     if not {"pixel_format", "width", "height"} <= told.keys():
         raise ValueError("the frame says neither its size nor its format")
     return pixels.decode(told["pixel_format"], told["width"], told["height"], payload)

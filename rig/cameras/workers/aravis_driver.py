@@ -7,14 +7,14 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Optional
 
-import gi  # type: ignore[import-untyped, unused-ignore]
+import gi
 
 from geometry.errors import DeviceError
 from rig.cameras.workers import features
 from rig.cameras.workers.serve import Picture
 
 gi.require_version("Aravis", "0.8")
-from gi.repository import Aravis, GLib  # type: ignore[import-untyped, unused-ignore]  # noqa: E402
+from gi.repository import Aravis, GLib  # noqa: E402
 
 GVSP_IDS = 65535
 """Frame ids of GigE Vision are 1 to 65535; 0 is none."""

@@ -89,7 +89,11 @@ def read_settings(nodes: Nodes) -> dict[str, Any]:
 
 
 def _set_number(
-    nodes: Nodes, names: Sequence[str], field: str, value: Any, auto: str  # noqa: ANN401
+    nodes: Nodes,
+    names: Sequence[str],
+    field: str,
+    value: Any,  # noqa: ANN401  as it came from the host
+    auto: str,
 ) -> None:
     if value is None:
         return

@@ -7,8 +7,8 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from genicam import genapi, gentl  # type: ignore[import-untyped, unused-ignore]
-from harvesters.core import Harvester  # type: ignore[import-untyped, unused-ignore]
+from genicam import genapi, gentl
+from harvesters.core import Harvester
 
 from geometry.errors import DeviceError
 from rig.cameras.workers import features
@@ -240,10 +240,16 @@ class GenicamDriver:
             self._nodes.get("PayloadSize" if self._nodes.has("PayloadSize") else "Width")
         names = {"num_delivered": "delivered", "num_underrun": "underruns"}
         streams = self._acquirer.data_streams
-        counts = {} if not streams else {
-            ours: _told(streams[0].module if hasattr(streams[0], "module") else streams[0], theirs)
-            for theirs, ours in names.items()
-        }
+        counts = (
+            {}
+            if not streams
+            else {
+                ours: _told(
+                    streams[0].module if hasattr(streams[0], "module") else streams[0], theirs
+                )
+                for theirs, ours in names.items()
+            }
+        )
         return {name: int(count) for name, count in counts.items() if count is not None}
 
     def close(self) -> None:

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import PurePosixPath
 from typing import Any
 
-import gphoto2 as gp  # type: ignore[import-untyped, unused-ignore]
+import gphoto2 as gp
 
 from geometry.errors import DeviceError, InputError
 from rig.cameras.workers.bodysettings import WIDGETS, nearest, read_value

@@ -31,6 +31,7 @@ class OpencvDriver:
         self._source: str | int = options["source"]
         self._capture: Any = None
         self._live = True
+        self._armed = False
         self._triggers: list[int] = []
         self._books = threading.Lock()
         self._skip = 0
@@ -94,6 +95,12 @@ class OpencvDriver:
         """Empty the driver's buffers, so that the next frame is a fresh one."""
         with self._books:
             self._triggers.clear()
+        dropped = self._flush()
+        self._armed = True
+        return dropped
+
+    def _flush(self) -> int:
+        """Let go of frames until one had to be waited for; how many were old."""
         if not self._live:
             return 0
         for dropped in range(FLUSH_FRAMES):
@@ -160,6 +167,7 @@ class OpencvDriver:
 
     def disarm(self) -> None:
         """Want no more frames."""
+        self._armed = False
         with self._books:
             self._triggers.clear()
 
@@ -168,11 +176,13 @@ class OpencvDriver:
         return ()
 
     def ping(self) -> Mapping[str, int]:
-        """Whether the source is open, and its device still there."""
+        """Whether the source is there; one that is not armed must give a new frame."""
         source = self._source
         gone = isinstance(source, str) and source.startswith("/dev/") and not Path(source).exists()
         if gone or not self._capture.isOpened():
             raise _gone("its device is not there any more")
+        if not self._armed:
+            self._flush()
         return {}
 
     def close(self) -> None:

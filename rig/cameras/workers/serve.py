@@ -78,9 +78,15 @@ class Driver(Protocol):
 class Worker:
     """Serves one driver to the host at the other end of two streams."""
 
-    def __init__(self, make: Callable[[Mapping[str, Any]], Driver], out: BinaryIO) -> None:
+    def __init__(
+        self,
+        make: Callable[[Mapping[str, Any]], Driver],
+        out: BinaryIO,
+        on_host_gone: Callable[[], None],
+    ) -> None:
         self._make = make
         self._out = out
+        self._on_host_gone = on_host_gone
         self._driver: Driver | None = None
         self._commands: queue.Queue[wire.Header | None] = queue.Queue()
         self._writing = threading.Lock()
@@ -104,10 +110,7 @@ class Worker:
             while (message := wire.receive(source)) is not None:
                 self._commands.put(message[0])
         self._commands.put(None)
-        # A library may hang in the main thread for good; the host is gone, so nobody waits.
-        timer = threading.Timer(LAST_GRACE_S, os._exit, (1,))
-        timer.daemon = True
-        timer.start()
+        self._on_host_gone()
 
     def _say(self, header: Mapping[str, object], payload: bytes = b"") -> None:
         with self._writing, contextlib.suppress(OSError):
@@ -130,7 +133,8 @@ class Worker:
         if do == "open":
             return self._open(args)
         if do == "close":
-            return self._let_go()
+            self._let_go()
+            return None
         if self._driver is None:
             raise InternalError("worker", f"'{do}' before 'open'", "report this")
         return self._drive(self._driver, str(do), args)
@@ -156,7 +160,8 @@ class Worker:
             return dropped
         if do == "disarm":
             self._armed = False
-            return driver.disarm()
+            driver.disarm()
+            return None
         if do == "configure":
             return driver.configure(args["settings"])
         if do == "clock":
@@ -226,6 +231,13 @@ def spell(error: RigwrightError) -> dict[str, str]:
     }
 
 
+def _end_soon() -> None:
+    # A library may hang in the main thread for good; the host is gone, so nobody else ends it.
+    timer = threading.Timer(LAST_GRACE_S, os._exit, (1,))
+    timer.daemon = True
+    timer.start()
+
+
 def main(target: str) -> None:
     """Serve the driver ``package.module:Class`` on standard input and output."""
     # Libraries print to standard output; a word of theirs between two messages would break both.
@@ -233,7 +245,7 @@ def main(target: str) -> None:
     os.dup2(2, 1)
     module, _, name = target.partition(":")
     make = getattr(importlib.import_module(module), name)
-    Worker(make, out).run(sys.stdin.buffer)
+    Worker(make, out, _end_soon).run(sys.stdin.buffer)
     out.close()
     sys.stderr.flush()
     # Nothing is left to be done, and some libraries crash or hang while they are unloaded.
