@@ -1,0 +1,92 @@
+"""A glance at each picture: can it be read, how large is it, is there anything on it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+
+from rig.cameras.base import Frame, Image
+from rig.capture.faults import Fault, FaultKind
+from rig.capture.take import Pairing
+
+BLACK_SHARE = 1.0 / 16.0
+"""A picture whose 99.9th percentile stays below this share of full scale shows nothing: the noise
+of a dark frame stays far below, the lit side of a face far above."""
+
+STRIDE = 3
+"""Every third row and column decide about blackness: enough of any face, a ninth of the work."""
+
+READABLE_TYPES = ("image/jpeg", "image/png", "image/tiff")
+"""What is read to be looked at. Raw files are filed as they came."""
+
+
+@dataclass(frozen=True)
+class Look:
+    """What a glance showed. ``size_px`` (width, height) None where it could not be read."""
+
+    size_px: tuple[int, int] | None
+    black: bool = False
+    readable: bool = True
+
+
+def is_raw(frame: Frame) -> bool:
+    """Whether a frame is a file of a kind that is filed beside the pictures, unread."""
+    return frame.encoded is not None and frame.media_type not in READABLE_TYPES
+
+
+def look_at(frame: Frame) -> Look:
+    """Glance at one picture."""
+    if frame.pixels is not None:
+        height, width = frame.pixels.shape[:2]
+        return Look((width, height), _black(frame.pixels))
+    if frame.encoded is None:
+        return Look(None, readable=False)
+    if is_raw(frame):
+        return Look(None)
+    return _look_at_file(frame.encoded)
+
+
+def _look_at_file(data: bytes) -> Look:
+    import cv2
+
+    flags = cv2.IMREAD_UNCHANGED | cv2.IMREAD_IGNORE_ORIENTATION
+    try:
+        pixels = cv2.imdecode(np.frombuffer(data, np.uint8), flags)
+    except cv2.error:
+        # OpenCV throws for some damaged files and returns nothing for others.
+        pixels = None
+    if pixels is None or pixels.dtype not in (np.uint8, np.uint16):
+        return Look(None, readable=False)
+    height, width = pixels.shape[:2]
+    if data[:2] == b"\xff\xd8" and b"\xff\xd9" not in data[-4096:]:
+        # The decoder fills what is missing of a JPEG that was cut off with grey.
+        return Look((width, height), readable=False)
+    return Look((width, height), _black(cast(Image, pixels)))
+
+
+def _black(pixels: Image) -> bool:
+    full = float(np.iinfo(pixels.dtype).max)
+    thin = pixels[::STRIDE, ::STRIDE]
+    return bool(np.percentile(thin, 99.9) < BLACK_SHARE * full)
+
+
+def look_faults(pairing: Pairing, size_px: tuple[int, int] | None) -> list[Fault]:
+    """What is wrong with the pictures of one camera that were given to shots."""
+    faults = []
+    for one in pairing.pairs:
+        look = look_at(one.frame)
+        name, shot = pairing.camera, one.shot
+        which = f"{name}: the picture of shot {shot}"
+        if not look.readable:
+            text = f"{which} cannot be read"
+            faults.append(Fault(FaultKind.UNREADABLE, text, name, shot))
+        if look.black:
+            text = f"{which} is black; check the flash, the lens cap and the exposure"
+            faults.append(Fault(FaultKind.BLACK, text, name, shot))
+        if look.size_px is not None and size_px is not None and look.size_px != size_px:
+            is_, should = "{} x {}".format(*look.size_px), "{} x {}".format(*size_px)
+            text = f"{which} has {is_} pixels, {should} are expected"
+            faults.append(Fault(FaultKind.WRONG_SIZE, text, name, shot))
+    return faults

@@ -1,0 +1,354 @@
+"""A station in operation: its open box and cameras, and all that can be done with them."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import secrets
+import threading
+import time
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from geometry.errors import ConflictError, InputError, RigwrightError
+from rig.capture.boards import station_board
+from rig.capture.clocks import ClockFitter, fit_clock
+from rig.capture.develop import develop
+from rig.capture.devices import DeviceMaker, StationDevices
+from rig.capture.faults import Fault
+from rig.capture.lags import estimate_lags, new_timings
+from rig.capture.opening import OpenCameras
+from rig.capture.results import CaptureResult, DryRun, RigHealth, SelfTest, SyncCheck
+from rig.capture.rigfacts import (
+    focal_lengths_mm,
+    picture_sizes,
+    read_rig_design,
+    rig_sha256,
+    session_plan,
+)
+from rig.capture.run import CaptureRun, Fate, Order
+from rig.capture.selftest import self_test
+from rig.capture.sessionfolder import Session
+from rig.capture.shooting import Shooting
+from rig.capture.staging import Stage
+from rig.capture.storage import Disk
+from rig.capture.verdict import Board, Evidence, gather
+from rig.station.delays import Timing
+from rig.station.locks import DeviceLocks, device_names
+from rig.station.pulses import check_burst
+from rig.station.spec import Station
+from rig.trigger.box import TriggerBox
+from solver.progress import (
+    CancelToken,
+    NeverCancelled,
+    Progress,
+    ProgressCallback,
+    ignore_progress,
+)
+
+BOX_ID_LENGTH = 12
+NEVER = NeverCancelled()
+
+
+def open_station(
+    station: Station,
+    devices: DeviceMaker | None = None,
+    *,
+    locks: Path | None = None,
+    fit: ClockFitter = fit_clock,
+) -> Rig:
+    """Open a station's box and cameras, and own them until :meth:`Rig.close`.
+
+    A camera that cannot be opened does not stop the others; it is tried again before each
+    capture. ``locks``: where lock files lie, one place per computer by default. Raises
+    :class:`ConflictError` ``device-busy`` when another process has a device, and
+    :class:`DeviceError` when the box, or every camera, is not there.
+    """
+    return Rig(station, StationDevices() if devices is None else devices, locks, fit)
+
+
+class Rig:
+    """An open station. All methods may be called from any thread; one thing is done at a time.
+
+    :meth:`abort` and :meth:`health` are allowed always; what else is asked for meanwhile is
+    refused with :class:`ConflictError` ``rig-busy``, which says what it is busy with.
+    """
+
+    def __init__(
+        self, station: Station, maker: DeviceMaker, locks: Path | None, fit: ClockFitter
+    ) -> None:
+        self.station = station
+        self.box: TriggerBox | None = None
+        self._maker = maker
+        self._fit = fit
+        self._turn = threading.Lock()
+        self._doing: str | None = None
+        self._aborted = threading.Event()
+        self._design = read_rig_design(station)
+        with contextlib.ExitStack() as opened:
+            opened.enter_context(DeviceLocks(device_names(station), locks))
+            opened.callback(maker.close)
+            if station.trigger is not None:
+                self.box = maker.make_box(station.trigger)
+                opened.callback(self.box.close)
+                self.box.open()
+            self._cameras = OpenCameras(station, maker, self.box)
+            opened.callback(self._cameras.close)
+            self._cameras.require_some()
+            self._opened = opened.pop_all()
+
+    def close(self) -> None:
+        """Disarm and let go of everything. Closing twice changes nothing."""
+        self._opened.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def health(self) -> RigHealth:
+        """How everything is; asks nothing of the devices and never waits."""
+        box = None if self.box is None else self.box.health()
+        return RigHealth(box, self._cameras.health(), self._doing)
+
+    def abort(self) -> None:
+        """All outputs low, now, and an end to what is being done; always allowed."""
+        self._aborted.set()
+        if self.box is not None:
+            self.box.abort()
+
+    def new_session(
+        self, folder: Path, subject: str = "", operator: str = "", disk: Disk | None = None
+    ) -> Session:
+        """Begin a session with this rig in a new folder."""
+        infos = {hand.plan.name: hand.device.info for hand in self._cameras.hands(self.station)}
+        plan = session_plan(self.station, self._design, infos, subject, operator)
+        return Session.create(folder, plan, disk)
+
+    def capture(
+        self,
+        session: Session,
+        capture_id: str,
+        *,
+        shots: int = 1,
+        interval_us: float = 0.0,
+        allow_partial: bool | None = None,
+        board: Board | None = None,
+        progress: ProgressCallback = ignore_progress,
+        cancel: CancelToken = NEVER,
+    ) -> CaptureResult:
+        """Take a capture and commit it to ``session``; the same id again returns what is there.
+
+        ``allow_partial`` None: as the station says. ``board``: how to read the timing board, where
+        one stands in the pictures. A capture that lacks pictures is committed as partial, and
+        :attr:`CaptureResult.error` says so. Raises :class:`DeviceError`, :class:`InterlockError`,
+        :class:`ConflictError` and :class:`CancelledError`; then nothing was committed.
+        """
+        partial = self.station.policy.allow_partial if allow_partial is None else allow_partial
+        self._check_burst(shots, interval_us)
+        with self._busy_with(f"capture {capture_id}"):
+            known = session.committed(capture_id)
+            if known is not None:
+                return CaptureResult(known, session.folder, repeated=True)
+            self._require_same_rig(session)
+            progress(Progress("checking", 0.0))
+            session.require_space(self.station.policy.min_free_mb)
+            stage = Stage(session, capture_id)
+            name = box_name(session.manifest.session_id, capture_id)
+            order = Order(capture_id, name, shots, interval_us, partial)
+            run = self._run(order, progress, cancel, stage)
+            shooting, evidence = self._shoot(run, stage, board or station_board(self.station))
+            progress(Progress("writing", 0.8))
+            try:
+                record = stage.commit(
+                    shooting,
+                    evidence,
+                    self.station.policy,
+                    partial_allowed=partial,
+                    focal_mm=focal_lengths_mm(self._design),
+                )
+            except BaseException as error:
+                # What is left stays for recovery where even this cannot be written any more.
+                with contextlib.suppress(RigwrightError):
+                    session.tidy()
+                    if session.books.committed(capture_id) is None:
+                        stage.set_aside("fired", f"its pictures could not be written: {error}")
+                raise
+            progress(Progress("committed", 1.0))
+            return CaptureResult(record, session.folder)
+
+    def _shoot(
+        self, run: CaptureRun, stage: Stage, board: Board | None
+    ) -> tuple[Shooting, Evidence]:
+        """Fire and judge; on any error the stage tells what became of the id."""
+        try:
+            firing = run.run()
+            run.progress(Progress("checking pictures", 0.7))
+            sizes = picture_sizes(self.station, self._design)
+            shooting = develop(self.station, firing, self._fit, sizes)
+            return shooting, gather(self.station, shooting, board)
+        except BaseException as error:
+            # Whatever else goes wrong now, the first error is the one to be told.
+            with contextlib.suppress(RigwrightError):
+                if run.fate is Fate.NOT_FIRED:
+                    stage.drop()
+                else:
+                    stage.set_aside(run.fate.value, str(error) or type(error).__name__)
+            raise
+
+    def dry_run(
+        self,
+        *,
+        shots: int = 1,
+        interval_us: float = 0.0,
+        allow_partial: bool | None = None,
+        progress: ProgressCallback = ignore_progress,
+        cancel: CancelToken = NEVER,
+    ) -> DryRun:
+        """Everything a capture does up to FIRE; raises what a capture would raise."""
+        partial = self.station.policy.allow_partial if allow_partial is None else allow_partial
+        self._check_burst(shots, interval_us)
+        with self._busy_with("a dry run"):
+            began = time.monotonic()
+            order = Order("dry-run", box_name("dry-run"), shots, interval_us, partial)
+            faults = self._run(order, progress, cancel).rehearse()
+            lost = {fault.camera for fault in faults}
+            ready = tuple(c.name for c in self.station.cameras if c.name not in lost)
+            return DryRun(ready, faults, time.monotonic() - began)
+
+    def self_test(self, folder: Path | None = None) -> SelfTest:
+        """Look at box, interlock, clock, cameras and the space in ``folder``; fires nothing."""
+        with self._busy_with("a self-test"):
+            self._cameras.open_lost()
+            hands = self._cameras.hands(self.station)
+            return self_test(self.station, self.box, hands, self._cameras.problems, folder)
+
+    def sync_check(
+        self,
+        captures: int = 3,
+        *,
+        pause_s: float = 0.5,
+        board: Board | None = None,
+        progress: ProgressCallback = ignore_progress,
+        cancel: CancelToken = NEVER,
+    ) -> SyncCheck:
+        """Fire several times, file nothing, and say each camera's lag and the delays it asks for.
+
+        ``pause_s`` between captures: the lag of DSLRs is unsteady when they are hurried.
+        """
+        if captures < 1:
+            raise InputError("captures", f"{captures} captures show nothing", "give 1 or more")
+        with self._busy_with("a synchronisation check"):
+            seen: list[Evidence] = []
+            faults: list[Fault] = []
+            for k in range(captures):
+                progress(Progress(f"capture {k + 1} of {captures}", k / captures))
+                order = Order(f"sync-check-{k + 1}", box_name("sync-check"), 1, 0.0, False)
+                run = self._run(order, ignore_progress, cancel)
+                sizes = picture_sizes(self.station, self._design)
+                shooting = develop(self.station, run.run(), self._fit, sizes)
+                seen.append(gather(self.station, shooting, board or station_board(self.station)))
+                faults += shooting.all_faults
+                if k + 1 < captures:
+                    time.sleep(pause_s)
+        lags = estimate_lags(seen)
+        try:
+            timings, why_not = new_timings(self.station, lags), ""
+        except InputError as error:
+            return SyncCheck(tuple(seen), tuple(faults), lags, None, error.problem)
+        return SyncCheck(tuple(seen), tuple(faults), lags, timings, why_not)
+
+    def adopt(self, timings: Mapping[str, Timing]) -> None:
+        """Work with new delays from now on; the station file is written by ``write_timings``."""
+        cameras = []
+        for camera in self.station.cameras:
+            found = timings.get(camera.name)
+            cameras.append(
+                camera
+                if found is None
+                else replace(camera, delay_us=found.delay_us, expected_lag_us=found.expected_lag_us)
+            )
+        self.station = replace(self.station, cameras=tuple(cameras))
+
+    def _run(
+        self,
+        order: Order,
+        progress: ProgressCallback,
+        cancel: CancelToken,
+        stage: Stage | None = None,
+    ) -> CaptureRun:
+        self._cameras.open_lost()
+        return CaptureRun(
+            station=self.station,
+            box=self.box,
+            hands=self._cameras.hands(self.station),
+            order=order,
+            progress=progress,
+            cancel=_Either(cancel, self._aborted),
+            may_fire=lambda: None if stage is None else stage.may_fire(order.box_capture),
+            unopened=dict(self._cameras.problems),
+        )
+
+    def _check_burst(self, shots: int, interval_us: float) -> None:
+        check_burst(shots, interval_us)
+        for camera in self.station.cameras if shots > 1 else ():
+            if 2.0 * camera.lag_tolerance_us >= interval_us:
+                raise InputError(
+                    "interval",
+                    f"shots {interval_us / 1e3:g} ms apart cannot be told from each other by "
+                    f"camera {camera.name}, whose lag is known to "
+                    f"+- {camera.lag_tolerance_us / 1e3:g} ms",
+                    "give a longer interval, or a smaller lag_tolerance_us where it is true",
+                )
+
+    def _require_same_rig(self, session: Session) -> None:
+        if session.manifest.rig_sha256 != rig_sha256(self.station, self._design):
+            raise ConflictError(
+                "session-other-rig",
+                f"the session {session.folder} was begun with another rig "
+                f"({session.manifest.station})",
+                "begin a new session",
+            )
+
+    @contextlib.contextmanager
+    def _busy_with(self, what: str) -> Iterator[None]:
+        if not self._turn.acquire(blocking=False):
+            raise ConflictError(
+                "rig-busy", f"the rig is busy with {self._doing}", "wait for it, or abort it"
+            )
+        try:
+            self._doing = what
+            self._aborted.clear()
+            yield
+        finally:
+            self._doing = None
+            self._turn.release()
+
+
+class _Either:
+    """A cancel token that is set when one of two is."""
+
+    def __init__(self, one: CancelToken, other: CancelToken) -> None:
+        self._one, self._other = one, other
+
+    def is_set(self) -> bool:
+        return self._one.is_set() or self._other.is_set()
+
+
+def box_name(*parts: str) -> str:
+    """A capture's name at the box: 12 characters that were never used before.
+
+    The client's own id may be longer, and may be tried again after a refusal; the box must see
+    another name each time, because it fires each name only once.
+    """
+    text = "/".join((*parts, secrets.token_hex(8)))
+    return hashlib.sha256(text.encode()).hexdigest()[:BOX_ID_LENGTH]
