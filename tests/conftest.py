@@ -15,14 +15,6 @@ PROVIDED = ("needs_browser", "needs_avr", "needs_aravis", "needs_genicam", "need
 _wrongly_skipped: list[str] = []
 
 
-def pytest_configure(config: pytest.Config) -> None:
-    for mark in (
-        "needs_avr: needs Debian's gcc-avr, avr-libc and libsimavr-dev; skipped when absent",
-        "needs_node: needs avr-gcc, and node and npm, which fetch avr8js; skipped when absent",
-    ):
-        config.addinivalue_line("markers", mark)
-
-
 @pytest.hookimpl(hookwrapper=True)
 def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]):  # type: ignore[no-untyped-def]  # noqa: ANN201, ARG001
     outcome = yield
