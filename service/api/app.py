@@ -10,7 +10,7 @@ from anyio import to_thread
 from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 
-from service.api import designs, evaluations, root, scans
+from service.api import captures, designs, evaluations, rigs, rigtests, root, scans, sessions
 from service.api.context import Service
 from service.api.errors import install_error_handlers
 from service.api.middleware import JsonLimit, RequestLog
@@ -34,7 +34,10 @@ def make_app() -> FastAPI:
         docs_url=None,
         redoc_url=None,
     )
-    app.state.routers = [module.router for module in (root, scans, designs, evaluations)]
+    app.state.routers = [
+        module.router
+        for module in (root, scans, designs, evaluations, rigs, captures, rigtests, sessions)
+    ]
     for router in app.state.routers:
         app.include_router(router)
     install_error_handlers(app)
@@ -54,7 +57,7 @@ def create_app(service: Service) -> FastAPI:
 @asynccontextmanager
 async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     service: Service = app.state.service
-    service.jobs.start()
+    service.start()
     yield
     await to_thread.run_sync(service.stop)
 
