@@ -33,12 +33,17 @@ class SimulatedLine:
         def wait(seconds: float) -> None:
             self._come += self._box.run(seconds * 1000.0)
 
+        def reset() -> None:
+            # What the box was saying would be cut, and the players believe only whole lines.
+            self._come += self._box.run(20.0)
+            self._box.reset(Reset.EXTERNAL)
+
         return Hands(
             wait=wait,
             actions={
                 "interlock-open": lambda: self._box.interlock(closed=False),
                 "interlock-close": lambda: self._box.interlock(closed=True),
-                "reset": lambda: self._box.reset(Reset.EXTERNAL),
+                "reset": reset,
             },
             timeout_s=10.0,
         )

@@ -247,7 +247,8 @@ class FirmwareSim:
             self._pending += self._run("line", left)
             *whole, self._pending = self._pending.split(b"\n")
             for line in whole:
-                yield line.decode("ascii")
+                if line:
+                    yield line.decode("ascii")
 
     def answer(self, milliseconds: float = 100.0) -> str:
         """The next reply, checked, without its checksum; events before it are kept."""

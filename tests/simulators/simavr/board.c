@@ -1,3 +1,4 @@
+#include <simavr/avr_extint.h>
 #include <simavr/avr_ioport.h>
 #include <simavr/sim_elf.h>
 #include <stdio.h>
@@ -75,6 +76,11 @@ void board_interlock(bool open)
 static void after_reset(uint8_t flags)
 {
     avr->data[MCUSR] = flags;
+    /* Outputs 7 and 8 are also inputs of external interrupts. Nobody uses these, but simavr would
+     * look at a low one in every cycle. */
+    for (uint8_t i = 0; i < 2; i++) {
+        avr_extint_set_strict_lvl_trig(avr, i, 0);
+    }
     serial_attach();
     order_attach();
     board_interlock(interlock_open);
