@@ -28,6 +28,8 @@ MAX_DRIFT_PPM = 10_000.0
 WINDOW_S = 120.0
 """Older readings are dropped: over this time a clock's rate may be taken as even."""
 MAX_SAMPLES = 256
+_ROUNDING_NS = 1000.0
+"""A clock is read in steps; a box's are 500 ns, a camera's finer."""
 _STEPS = 60
 
 
@@ -148,8 +150,8 @@ class ClockModel:
 def _fit(samples: list[ClockSample], wire_ns: float) -> ClockFit | None:
     host0, device0 = samples[-1].host_before_ns, samples[-1].device_ns
     device = np.array([float(s.device_ns - device0) for s in samples])
-    before = np.array([float(s.host_before_ns - host0) for s in samples])
-    after = np.array([float(s.host_after_ns - host0) for s in samples])
+    before = np.array([float(s.host_before_ns - host0) for s in samples]) - _ROUNDING_NS
+    after = np.array([float(s.host_after_ns - host0) for s in samples]) + _ROUNDING_NS
     slope = _tightest_slope(device, before, after)
     low = float(np.max(before - slope * device))
     high = float(np.min(after - slope * device))

@@ -74,7 +74,7 @@ class FaultRates:
 
 @dataclass(frozen=True)
 class Incident:
-    """Something that happens once, when so many bytes or lines have gone one way.
+    """Something that happens once: at a byte or a line one way, or at the first line with a text.
 
     ``do``: ``unplug`` (and plugged in again ``for_s`` later; never when that is negative),
     ``reset`` (the box's, by the proxy's ``reset``), ``drop`` (this line), ``noise`` (4 kB).
@@ -84,13 +84,27 @@ class Incident:
     do: Literal["unplug", "reset", "drop", "noise"]
     at_byte: int | None = None
     at_line: int | None = None
+    containing: str = ""
     for_s: float = 0.5
 
     def __post_init__(self) -> None:
-        if (self.at_byte is None) == (self.at_line is None):
+        moments = (self.at_byte is not None, self.at_line is not None, self.containing != "")
+        if sum(moments) != 1:
             raise InputError(
-                "proxy-incident", "an incident needs one moment", "give at_byte or at_line"
+                "proxy-incident",
+                "an incident needs one moment",
+                "give at_byte, at_line or containing",
             )
+
+    def strikes(self, way: Way, line: int, before: int, unit: bytes) -> bool:
+        """Whether it happens at this line, which begins after ``before`` bytes."""
+        if way != self.way:
+            return False
+        if self.at_byte is not None:
+            return before <= self.at_byte < before + len(unit)
+        if self.at_line is not None:
+            return line == self.at_line
+        return self.containing.encode() in unit
 
 
 @dataclass(frozen=True)
@@ -136,7 +150,7 @@ class FaultProxy:
         self._reset = reset
         self._random = random.Random(script.seed)  # noqa: S311 - chance of faults
         self._order = count()
-        self._ways = {
+        self._ways: dict[Way, _Direction] = {
             "to_box": _Direction("to_box", script.to_box),
             "to_host": _Direction("to_host", script.to_host),
         }
@@ -161,6 +175,10 @@ class FaultProxy:
     def replug(self) -> None:
         """Put it back."""
         self._tell(self._endpoint.replug)
+
+    def add(self, incident: Incident) -> None:
+        """One more thing that will happen, once."""
+        self._incidents.append(incident)
 
     def close(self) -> None:
         """Stop. Closing twice changes nothing."""
@@ -286,13 +304,11 @@ class FaultProxy:
     def _incident(self, way: _Direction, unit: bytes) -> bytes:
         before, way.passed = way.passed, way.passed + len(unit)
         for incident in list(self._incidents):
-            at_byte, at_line = incident.at_byte, incident.at_line
-            by_byte = at_byte is not None and before <= at_byte < way.passed
-            if incident.way != way.way or not (by_byte or at_line == way.lines):
+            if not incident.strikes(way.way, way.lines, before, unit):
                 continue
             self._incidents.remove(incident)
             self.done[incident.do] += 1
-            kept = unit[: at_byte - before] if at_byte is not None else b""
+            kept = unit[: incident.at_byte - before] if incident.at_byte is not None else b""
             if incident.do == "noise":
                 unit = self._random.randbytes(4096) + unit
             elif incident.do == "drop":

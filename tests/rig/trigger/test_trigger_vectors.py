@@ -5,55 +5,19 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+from stepped_box import SteppedBox
 
 from rig.trigger.conformance import (
-    Hands,
     VectorMismatch,
     fill,
     load_vectors,
     play_dialogue,
     play_framing,
 )
-from rig.trigger.fake.device import FakeBox, FakeSettings
-from rig.trigger.fake.line import FakeLine
 from rig.trigger.lines import MAX_ANSWER, ErrorCode, LineError, LineReader, crc16
 from rig.trigger.protocol import COMMANDS, Event, Reply, parse_answer
 
 VECTORS = load_vectors()
-
-
-class SteppedBox:
-    """A fake box on a clock of its own: reading costs no time but what a test lets pass."""
-
-    def __init__(self, settings: FakeSettings | None = None) -> None:
-        self.now_ns = 1_000_000_000
-        self.box = FakeBox(lambda: self.now_ns, settings or FakeSettings())
-        self.line = FakeLine(self.box, lambda: self.now_ns)
-        self._said = bytearray()
-
-    def write(self, data: bytes) -> int:
-        self.now_ns += 100_000
-        self.line.receive(data)
-        return len(data)
-
-    def read(self, size: int = 1) -> bytes:
-        self._said += self.line.take()
-        if not self._said:
-            self.now_ns += 1_000_000
-        part = bytes(self._said[:size])
-        del self._said[:size]
-        return part
-
-    def wait(self, seconds: float) -> None:
-        self.now_ns += int(seconds * 1e9)
-
-    def hands(self) -> Hands:
-        actions = {
-            "interlock-open": lambda: self.box.set_interlock(closed=False),
-            "interlock-close": lambda: self.box.set_interlock(closed=True),
-            "reset": self.box.reset,
-        }
-        return Hands(wait=self.wait, actions=actions, timeout_s=0.5)
 
 
 def name_of(vector: dict[str, Any]) -> str:
@@ -105,7 +69,6 @@ def test_vectors_cover_every_command_and_every_error() -> None:
 
 def test_the_player_notices_a_wrong_device() -> None:
     device = SteppedBox()
-    device.box.permanent.serial_number = "with space"[:4]
     device.box.limits = type(device.box.limits)(max_edges=2)
     capture = next(d for d in VECTORS["dialogues"] if d["name"] == "a capture")
     with pytest.raises(VectorMismatch, match="a capture, step 4"):
