@@ -230,9 +230,9 @@ static void expire(void)
 static void show(void)
 {
     if (state == STATE_IDLE) {
-        status_led((clock_overflows & 63) == 0);
+        status_led((clock_overflows.low & 63) == 0);
     } else if (state == STATE_FAULT) {
-        status_led(clock_overflows & 8);
+        status_led(clock_overflows.low & 8);
     }
 }
 

@@ -8,22 +8,23 @@
 #include "ports.h"
 #include "uart.h"
 
-/* The interrupt comes this early. It may be kept waiting by one other interrupt that has begun,
- * by the pin change (which goes first), or by LOCKED_TICKS of uart.c: together under 40 ticks. */
-#define EARLY 64
+/* The interrupt comes this early. It may be kept waiting by one other interrupt that has begun and
+ * by the pin change, which goes first (20 ticks each), and takes 15 itself before it looks. */
+#define EARLY 96
 
 /* With less than this to the next edge, leaving the interrupt does not pay. */
 #define STAY (EARLY + 24)
 
-/* Bytes are taken from the serial line while waiting, up to this before the edge: taking one
- * costs up to 12 ticks. */
-#define BUSY 26
+/* What player_sync needs: SYNC_TICKS, and the way to it. With an edge that is late the way is
+ * longer. */
+#define SYNC_NEEDS (SYNC_TICKS + 8)
+#define LATE_NEEDS (SYNC_NEEDS + 6)
 
-/* What player_sync needs: SYNC_TICKS, and the way to it. */
-#define SYNC_NEEDS (SYNC_TICKS + 4)
+/* Bytes are taken from the serial line while waiting, up to this before the edge: taking a line
+ * end costs up to 16 ticks. */
+#define BUSY (SYNC_NEEDS + 16)
 
 struct edge *player_sync(struct edge *first, uint8_t tick);
-struct edge *player_now(struct edge *first);
 
 uint8_t burst_late[MAX_SHOTS];
 
@@ -34,10 +35,11 @@ static uint32_t shot_interval;
 static uint8_t side;
 static uint8_t shot_late;
 
+/* A match that is pending already brings the interrupt once more than needed; it looks at the time
+ * and waits again. Clearing the flag would save that, and lose the match that comes meanwhile. */
 static inline void schedule(uint32_t due)
 {
     OCR1A = (uint16_t)due - EARLY;
-    TIFR1 = _BV(OCF1A);
 }
 
 static inline uint8_t saturate(uint32_t ticks)
@@ -45,34 +47,31 @@ static inline uint8_t saturate(uint32_t ticks)
     return ticks > UINT8_MAX ? UINT8_MAX : (uint8_t)ticks;
 }
 
-/* Play the run that begins with an edge `left` ticks from now; its last edge. Late edges keep
- * their distances: a run is late as a whole. */
+/* Play the run that begins with an edge `left` ticks from now; its last edge. An edge whose time
+ * has gone, or is too near, comes as soon as it can be synchronised, and its run keeps its
+ * distances: a run is late as a whole, by so many ticks exactly. */
 static inline __attribute__((always_inline)) struct edge *play(struct edge *first, uint32_t due,
                                                                int32_t left)
 {
-    uint16_t due_low = (uint16_t)due;
-    int16_t wait = (int16_t)(due_low - TCNT1);
+    uint16_t target = (uint16_t)due;
+    int16_t wait = (int16_t)(target - TCNT1);
     uint8_t late = 0;
-    struct edge *last;
     while (left >= 0 && wait > BUSY) {
         if (UCSR0A & _BV(RXC0)) {
             uart_receive_locked();
         }
-        wait = (int16_t)(due_low - TCNT1);
+        wait = (int16_t)(target - TCNT1);
     }
-    if (left >= 0 && wait >= SYNC_NEEDS) {
-        last = player_sync(first, (uint8_t)due_low - SYNC_TICKS);
-    } else {
-        while ((int32_t)(due - clock_ticks_locked()) > 0) {
-        }
-        late = saturate(clock_ticks_locked() - due);
-        last = player_now(first);
+    if (left < 0 || wait < SYNC_NEEDS) {
+        uint32_t soonest = clock_ticks_locked() + LATE_NEEDS;
+        late = saturate(soonest - due);
+        target = (uint16_t)soonest;
     }
     first->late[side] = late;
     if (late > shot_late) {
         shot_late = late;
     }
-    return last;
+    return player_sync(first, (uint8_t)target - SYNC_TICKS);
 }
 
 /* Count a complete shot; whether it was the last. */

@@ -3,11 +3,11 @@
 #include <avr/interrupt.h>
 #include <util/atomic.h>
 
-volatile uint32_t clock_overflows;
+volatile union halves clock_overflows;
 
 ISR(TIMER1_OVF_vect)
 {
-    clock_overflows++;
+    clock_overflows.all++;
 }
 
 /* Normal mode, never stopped and never set: a timer that is written to loses ticks. */
@@ -33,7 +33,7 @@ struct instant clock_now(void)
     struct instant now;
     ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
     {
-        uint32_t overflows = clock_overflows;
+        uint32_t overflows = clock_overflows.all;
         uint16_t low = TCNT1;
         if ((TIFR1 & _BV(TOV1)) && low < 0x8000) {
             overflows++;

@@ -10,7 +10,16 @@ struct instant {
     uint16_t high;
 };
 
-extern volatile uint32_t clock_overflows;
+/* A number as two halves: shifting halves into place costs the edge interrupt time. */
+union halves {
+    uint32_t all;
+    struct {
+        uint16_t low;
+        uint16_t high;
+    };
+};
+
+extern volatile union halves clock_overflows;
 
 void clock_start(void);
 
@@ -28,12 +37,13 @@ void instant_add(struct instant *instant, uint32_t ticks);
  * counted yet shows in TOV1; without it a reading just after one would be 33 ms too early. */
 static inline __attribute__((always_inline)) uint32_t clock_ticks_locked(void)
 {
-    uint16_t low = TCNT1;
-    uint16_t high = (uint16_t)clock_overflows;
-    if ((TIFR1 & _BV(TOV1)) && low < 0x8000) {
-        high++;
+    union halves ticks;
+    ticks.low = TCNT1;
+    ticks.high = clock_overflows.low;
+    if ((TIFR1 & _BV(TOV1)) && ticks.low < 0x8000) {
+        ticks.high++;
     }
-    return ((uint32_t)high << 16) | low;
+    return ticks.all;
 }
 
 #endif

@@ -14,7 +14,7 @@
 
 /* Edges nearer than this are one run, played without looking at the clock in between. Further
  * ones are synchronised anew, for which the edge interrupt needs less than this. */
-#define RUN_GAP 24
+#define RUN_GAP 32
 
 /* Ticks that synchronising takes, from the begin of the tick that is waited for to the edge. */
 #define SYNC_TICKS 6

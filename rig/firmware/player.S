@@ -3,9 +3,7 @@
 ; struct edge *player_sync(struct edge *first, uint8_t tick)
 ;     Waits for TCNT1L == tick, then plays so that the first OUT falls on the first cycle of the
 ;     tick SYNC_TICKS later. Interrupts must be off and the tick not have begun.
-; struct edge *player_now(struct edge *first)
-;     Plays at once.
-; Both return the last edge of the run.
+;     Returns the last edge of the run.
 ;
 ; Reading the counter in a loop finds the begin of a tick only to within the loop's 5 cycles. The
 ; four readings after it fall 8 cycles apart, at the begin of a tick for whoever is last in those
@@ -18,7 +16,6 @@
 
 .text
 .global player_sync
-.global player_now
 
 player_sync:
     movw r30, r24
@@ -40,19 +37,9 @@ player_sync:
     nop
     nop
 .endr
-    rjmp 5f                     ; 2    one tick to the first OUT
-5:  nop
-    nop
-    nop
-    nop
-    rjmp play                   ; 2
-
-player_now:
-    movw r30, r24
-    ldd  r18, Z + EDGE_B
-    ldd  r19, Z + EDGE_C
-    ldd  r20, Z + EDGE_D
-    ldd  r21, Z + EDGE_WAIT
+    rjmp .+0                    ; 8    one tick to the first OUT
+    rjmp .+0
+    rjmp .+0
     rjmp play
 
 next:                           ;      6 cycles since the first OUT

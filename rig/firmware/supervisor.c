@@ -24,7 +24,7 @@ static uint8_t limit(uint8_t output)
 
 bool supervisor_overtime(uint8_t round)
 {
-    uint8_t look = (uint8_t)clock_overflows;
+    uint8_t look = (uint8_t)clock_overflows.low;
     uint8_t passed = look - last_look;
     uint16_t pins = ports_pins(PORTB, PORTC, PORTD);
     bool overtime = false;

@@ -13,7 +13,7 @@
 /* Interrupts go off this long before a promised tick. Shorter than the edge interrupt is early. */
 #define LOCKED_TICKS 24
 
-volatile struct rx_ring uart_rx;
+struct rx_ring uart_rx;
 
 static volatile uint8_t tx_bytes[TX_SIZE];
 static volatile uint8_t tx_head;

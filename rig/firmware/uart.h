@@ -16,12 +16,12 @@
 
 struct rx_ring {
     uint8_t bytes[RX_SIZE];
-    uint8_t head;
-    uint8_t tail;
+    volatile uint8_t head;
+    volatile uint8_t tail;
     bool lost;
 };
 
-extern volatile struct rx_ring uart_rx;
+extern struct rx_ring uart_rx;
 
 void uart_start(void);
 
@@ -42,40 +42,36 @@ void uart_hold(void);
  * what was held back is dropped, and what is put from now on is still held. */
 bool uart_release_at(uint32_t tick);
 
-static inline __attribute__((always_inline)) void uart_rx_push(uint8_t byte)
+static inline __attribute__((always_inline)) uint8_t uart_rx_push(uint8_t head, uint8_t byte)
 {
-    uart_rx.bytes[uart_rx.head] = byte;
-    uart_rx.head = (uart_rx.head + 1) & (RX_SIZE - 1);
+    uart_rx.bytes[head] = byte;
+    return (head + 1) & (RX_SIZE - 1);
 }
 
 /* Take the byte that has come into the ring. Inline, because the edge interrupt too calls it while
  * it waits, and a call would cost it 30 cycles of saved registers. */
 static inline __attribute__((always_inline)) void uart_receive_locked(void)
 {
-    uint8_t status = UCSR0A;
+    bool damaged = (UCSR0A & (_BV(FE0) | _BV(DOR0))) || uart_rx.lost;
     uint8_t byte = UDR0;
-    uint8_t room = (uart_rx.tail - uart_rx.head - 1) & (RX_SIZE - 1);
-    if ((status & (_BV(FE0) | _BV(DOR0))) || uart_rx.lost) {
-        if (room < 6) { /* the mark, a line end and its tick */
-            uart_rx.lost = true;
-            return;
-        }
-        uart_rx_push(RX_DAMAGE);
-        uart_rx.lost = false;
-        room--;
-    }
-    if (room < 5) {
-        uart_rx.lost = true;
+    uint8_t head = uart_rx.head;
+    uint8_t room = (uart_rx.tail - head - 1) & (RX_SIZE - 1);
+    uart_rx.lost = room < 6; /* a mark, a line end and its tick */
+    if (uart_rx.lost) {
         return;
     }
-    uart_rx_push(byte);
-    if (byte == '\n') {
-        uint32_t tick = clock_ticks_locked();
-        uart_rx_push((uint8_t)tick);
-        uart_rx_push((uint8_t)(tick >> 8));
-        uart_rx_push((uint8_t)(tick >> 16));
-        uart_rx_push((uint8_t)(tick >> 24));
+    if (damaged) {
+        head = uart_rx_push(head, RX_DAMAGE);
     }
+    head = uart_rx_push(head, byte);
+    if (byte == '\n') {
+        union halves tick = {.all = clock_ticks_locked()};
+        head = uart_rx_push(head, (uint8_t)tick.low);
+        head = uart_rx_push(head, (uint8_t)(tick.low >> 8));
+        head = uart_rx_push(head, (uint8_t)tick.high);
+        head = uart_rx_push(head, (uint8_t)(tick.high >> 8));
+    }
+    uart_rx.head = head;
 }
 
 #endif

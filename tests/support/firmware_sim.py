@@ -218,7 +218,7 @@ class FirmwareSim:
         return int(self.order("cycle"))
 
     def run(self, milliseconds: float) -> bytes:
-        """Let time pass; what the box sends meanwhile."""
+        """Let time pass; what the box sends meanwhile (it is still there to be read by line)."""
         return self._run("run", round(milliseconds * CYCLES_PER_MS))
 
     def run_cycles(self, cycles: int) -> bytes:
@@ -227,7 +227,9 @@ class FirmwareSim:
 
     def _run(self, order: str, cycles: int) -> bytes:
         answer = self.order(f"{order} {cycles}").split(" ")
-        return bytes.fromhex(answer[1]) if len(answer) > 1 else b""
+        said = bytes.fromhex(answer[1]) if len(answer) > 1 else b""
+        self._pending += said
+        return said
 
     def at(self, cycle: int, order: str) -> None:
         """Have an order done at a cycle: ``interlock``, ``reset``, ``send``, ``poke``."""
@@ -241,14 +243,26 @@ class FirmwareSim:
             self.order(f"send {data[start : start + 16384].hex()}")
 
     def lines(self, milliseconds: float) -> Iterator[str]:
-        """The whole lines that the box sends within a time, one by one as they end."""
+        """The whole lines that the box has sent, or sends within a time, as they end."""
         end = self.cycle + round(milliseconds * CYCLES_PER_MS)
-        while (left := end - self.cycle) > 0:
-            self._pending += self._run("line", left)
-            *whole, self._pending = self._pending.split(b"\n")
-            for line in whole:
+        while True:
+            while b"\n" in self._pending:
+                line, _, self._pending = self._pending.partition(b"\n")
                 if line:
                     yield line.decode("ascii")
+            if (left := end - self.cycle) <= 0:
+                return
+            self._run("line", left)
+
+    def hush(self) -> None:
+        """End the line to the box, let it say what it has to say, and forget that."""
+        while self.run(50.0):
+            pass
+        self.send(b"\n")
+        while self.run(50.0):
+            pass
+        self._pending = b""
+        self.events.clear()
 
     def answer(self, milliseconds: float = 100.0) -> str:
         """The next reply, checked, without its checksum; events before it are kept."""
@@ -330,9 +344,17 @@ class FirmwareSim:
                     edges.append(PinEdge(cycle, int(what), value))
         return edges
 
-    def sent(self) -> list[tuple[int, bytes]]:
-        """Every byte of the box with the cycle at which it began."""
-        return [(cycle, bytes([value])) for cycle, what, value in self._logged() if what == "tx"]
+    def sent(self) -> list[tuple[int, int]]:
+        """Every byte of the box with the cycle at which it began: (cycle, byte)."""
+        return [(cycle, value) for cycle, what, value in self._logged() if what == "tx"]
+
+    def received(self) -> list[tuple[int, int]]:
+        """Every byte to the box with the cycle at which it was whole (on simavr: about)."""
+        return [(cycle, value) for cycle, what, value in self._logged() if what == "rx"]
+
+    def resets(self) -> list[tuple[int, Reset]]:
+        """Every start of the processor."""
+        return [(cycle, Reset(value)) for cycle, what, value in self._logged() if what == "reset"]
 
 
 def unsealed(line: str) -> str:

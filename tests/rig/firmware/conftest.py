@@ -39,3 +39,10 @@ def one_box(tmp_path: Path) -> Iterator[FirmwareSim]:
     """The same on simavr only, for what no simulator sees differently."""
     with started(Simulator.SIMAVR, tmp_path / "edges.log") as simulated:
         yield simulated
+
+
+@pytest.fixture
+def js_box(tmp_path: Path) -> Iterator[FirmwareSim]:
+    """The same on avr8js only, for what simavr gets wrong."""
+    with started(Simulator.AVR8JS, tmp_path / "edges.log") as simulated:
+        yield simulated

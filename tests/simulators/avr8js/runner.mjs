@@ -98,8 +98,9 @@ createInterface({ input: process.stdin })
     if (text === "quit") {
       finish();
     }
-    console.log(answer(text));
-    board.flushLog();
+    const reply = answer(text);
+    board.flushLog(); // before the reply: whoever has it may read the log
+    console.log(reply);
   })
   .on("close", finish);
 slice();

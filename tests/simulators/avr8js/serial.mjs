@@ -73,6 +73,7 @@ export class Serial {
 
   arrive(byte) {
     const { cpu, uart } = this.board;
+    this.board.note("rx", byte);
     if (!(cpu.data[UCSRA] & RXC)) {
       uart.writeByte(byte, true);
     } else if (this.buffer.length < BUFFER) {

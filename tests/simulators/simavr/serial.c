@@ -89,6 +89,7 @@ static avr_cycle_count_t byte_time(struct avr_t *of, avr_cycle_count_t when, voi
             return when + RETRY_CYCLES;
         }
         uint8_t byte = queue[queue_tail++ % QUEUE];
+        board_log("rx", byte);
         receiver->cycles_per_byte = SHOW_CYCLES;
         avr_raise_irq(avr_io_getirq(of, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_INPUT), byte);
         receiver->cycles_per_byte = SENT_BYTE_CYCLES;
