@@ -15,7 +15,7 @@ from rig.trigger.box import ArmRequest, FireReport, TriggerCapabilities, Trigger
 from rig.trigger.captures import Captures, known_report, stranger_report
 from rig.trigger.clock import ClockModel
 from rig.trigger.jobs import PATIENCE_S, JobQueue
-from rig.trigger.keeper import Keeper
+from rig.trigger.keeper import BoxView, Keeper
 from rig.trigger.metrics import Metrics, WireLog
 from rig.trigger.owner import PROBE_S, PortOwner
 from rig.trigger.program import compile_program
@@ -92,6 +92,9 @@ class SerialTriggerBox:
         owner.start()
         try:
             owner.opened.result(PROBE_S + 4.0)
+        except TimeoutError:
+            self.close()
+            raise _late(self._keeper.view) from None
         except BaseException:
             self.close()
             raise
@@ -222,15 +225,18 @@ class SerialTriggerBox:
             return job.future.result(PATIENCE_S)
         except TimeoutError:
             job.future.cancel()
-            state = self._keeper.view
-            problem = state.problem or f"it is {state.state.value}"
-            raise DeviceError(
-                "trigger-gone",
-                f"the trigger box did not answer in time ({problem})",
-                "check its cable and power; it is looked for again by itself",
-            ) from None
+            raise _late(self._keeper.view) from None
         except FutureCancelledError:
             raise _closed() from None
+
+
+def _late(view: BoxView) -> DeviceError:
+    problem = view.problem or f"it is {view.state.value}"
+    return DeviceError(
+        "trigger-gone",
+        f"the trigger box did not answer in time ({problem})",
+        "check its cable and power; it is looked for again by itself",
+    )
 
 
 def _closed() -> DeviceError:

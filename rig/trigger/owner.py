@@ -103,13 +103,12 @@ class PortOwner:
         try:
             self._keeper.meet()
             self._captures.met()
-        except NoAnswerError:
+        except (NoAnswerError, RefusedError) as problem:
             if time.monotonic_ns() > self._probe_until_ns:
-                raise _gone(f"nothing answers within {PROBE_S:g} s") from None
+                why = f"nothing sound is answered within {PROBE_S:g} s ({problem})"
+                raise _gone(why) from None
             self._pause(PROBE_EVERY_S - (time.monotonic() - began))
             return
-        except RefusedError as refused:
-            raise _gone(str(refused)) from refused
         self._met = True
         self._backoff_s = BACKOFF_S[0]
         self._keeper.view.problem = ""

@@ -180,6 +180,10 @@ class FaultProxy:
         """One more thing that will happen, once."""
         self._incidents.append(incident)
 
+    def passed(self, way: Way) -> int:
+        """How many bytes have gone that way so far."""
+        return self._ways[way].passed
+
     def close(self) -> None:
         """Stop. Closing twice changes nothing."""
         if self._closing:

@@ -100,8 +100,12 @@ class SerialLine:
 
     def close(self) -> None:
         """Let go of port and lock, whatever state they are in."""
+        connection = getattr(self._port, "_socket", None)
         with suppress(*LINE_ERRORS):
             self._port.close()
+        if connection is not None:
+            # pyserial does not get to closing a socket whose other side has gone.
+            connection.close()
         self._lock.release()
 
     def send(self, data: bytes) -> None:
@@ -139,9 +143,11 @@ class SerialLine:
 
 
 def _open_port(url: str, baud: int) -> serial.SerialBase:
+    # rfc2217:// knows no time-out for writing and refuses to be given one.
+    patience_s = None if bare_url(url).startswith("rfc2217://") else _WRITE_PATIENCE_S
     try:
         return serial.serial_for_url(
-            url, baudrate=baud, timeout=0, write_timeout=_WRITE_PATIENCE_S, exclusive=True
+            url, baudrate=baud, timeout=0, write_timeout=patience_s, exclusive=True
         )
     except ValueError as error:
         raise DeviceError(

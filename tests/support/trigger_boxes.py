@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -95,6 +96,14 @@ def opened(url: str, **address: str) -> Iterator[SerialTriggerBox]:
         yield box
     finally:
         box.close()
+
+
+def wait_until(true: Callable[[], bool], within_s: float = 3.0) -> None:
+    """Until something is so; fails when it does not come."""
+    deadline = time.monotonic() + within_s
+    while not true():
+        assert time.monotonic() < deadline, "it did not happen in time"
+        time.sleep(0.005)
 
 
 def request_for(

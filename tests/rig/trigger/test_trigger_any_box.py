@@ -8,7 +8,7 @@ from __future__ import annotations
 import contextlib
 
 import pytest
-from trigger_boxes import AnyBox, opened, request_for
+from trigger_boxes import AnyBox, opened, request_for, wait_until
 
 from geometry.errors import ConflictError, DeviceError, InputError, InterlockError
 from rig.trigger.box import ArmRequest, Outcome, Pulse, TriggerState
@@ -83,6 +83,8 @@ def test_the_open_interlock_keeps_everything_off(box_under_test: AnyBox) -> None
         with pytest.raises(InterlockError):
             driver.reset()
         box_under_test.set_interlock(True)
+        # Real contacts bounce: the firmware waits before it believes that it is closed.
+        wait_until(lambda: driver.health().interlock_closed is True)
         driver.reset()
         driver.arm(request_for("c"))
         driver.fire("c")
