@@ -65,7 +65,7 @@ def test_the_camera_opened_is_the_one_asked_for(
 
 
 def test_a_camera_that_is_not_there_is_named(camera_rig: CameraRig) -> None:
-    with pytest.raises(RigwrightError, match="no-such-camera") as caught:
+    with pytest.raises(RigwrightError, match=r"no-such-camera") as caught:
         camera_rig.backend.open("no-such-camera")
     assert caught.value.code in ("device/camera-gone", "not-found/camera")
 
@@ -167,6 +167,13 @@ def test_disarming_twice_changes_nothing(camera_rig: CameraRig, device: CameraDe
     assert not device.health().armed
     assert device.health().connected
     assert len(shoot(camera_rig, device, 1)) >= 1
+
+
+def test_settings_may_change_while_armed(camera_rig: CameraRig, device: CameraDevice) -> None:
+    device.arm(SHOT)
+    device.configure(camera_rig.settings)
+    assert len(shoot(camera_rig, device, 1)) >= 1
+    assert device.health().counters.get("restarts", 0) == 0
 
 
 def test_a_software_trigger_is_refused_where_there_is_none(device: CameraDevice) -> None:
