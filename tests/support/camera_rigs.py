@@ -7,6 +7,7 @@ pull its plug.
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import http.server
 import importlib.util
 import os
@@ -22,8 +23,16 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+import pytest
 
-from rig.cameras.base import CameraBackend, CameraDevice, CameraSettings, TriggerKind
+from rig.cameras.base import (
+    ArmSpec,
+    CameraBackend,
+    CameraDevice,
+    CameraSettings,
+    Frame,
+    TriggerKind,
+)
 from rig.cameras.registry import make_backend
 from rig.cameras.remote import RemoteCamera
 
@@ -63,6 +72,27 @@ def free_running(device: CameraDevice) -> bool:
 def fire(device: CameraDevice) -> None:
     if device.capabilities.trigger is TriggerKind.SOFTWARE:
         device.software_trigger()
+
+
+SHOT = ArmSpec("capture", 1, 5.0)
+
+
+def shoot(rig: CameraRig, device: CameraDevice, count: int) -> list[Frame]:
+    """Arm and take pictures one after another."""
+    device.arm(dataclasses.replace(SHOT, shots=count))
+    frames: list[Frame] = []
+    for k in range(1, count + 1):
+        rig.shoot(device)
+        frames = list(device.wait_frames(k, rig.frame_s + 1.0))
+    return frames
+
+
+def assert_set(real: CameraSettings, wanted: CameraSettings, tolerance: float) -> None:
+    for name, value in dataclasses.asdict(wanted).items():
+        if isinstance(value, str):
+            assert getattr(real, name) == value
+        elif value is not None:
+            assert getattr(real, name) == pytest.approx(value, rel=tolerance)
 
 
 def crash(device: CameraDevice) -> None:

@@ -36,7 +36,7 @@ FAKE_PERIOD_S = 0.04
 def fake_camera(serial: str, lost_per_1000: int = 0, **options: object) -> Iterator[CameraDevice]:
     fake = FakeGigE(serial, lost_per_1000=lost_per_1000)
     try:
-        backend = AravisBackend(**options)
+        backend = AravisBackend(addresses={serial: "127.0.0.1"}, **options)
         try:
             yield backend.open(serial)
         finally:
