@@ -10,10 +10,13 @@ import importlib.util
 import shutil
 import subprocess
 import sys
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Annotated, Literal
 
 from pydantic import Field
 
+from rig.cameras.base import CameraInfo
 from rig.cameras.options import missing, read_options
 from rig.cameras.remote import RemoteBackend, WorkerSpec
 from rig.strict import StrictModel
@@ -35,6 +38,8 @@ class AravisOptions(StrictModel):
     ptp: bool = False
     ptp_wait_s: Annotated[float, Field(ge=0, le=60)] = 8.0
     command_deadline_s: Annotated[float, Field(gt=0, le=60)] = 1.5
+    addresses: Annotated[dict[str, str], Field(default_factory=dict)]
+    """Network addresses of cameras by serial number, where discovery does not reach them."""
     python: str | None = None
     """A Python with PyGObject and Aravis; found by itself where there is one."""
 
@@ -66,13 +71,28 @@ class AravisBackend(RemoteBackend):
 
     def __init__(self, **options: object) -> None:
         given = read_options("aravis", AravisOptions, options)
+        self._addresses = dict(given.addresses)
         super().__init__(
             WorkerSpec(
                 backend="aravis",
                 driver="rig.cameras.workers.aravis_driver:AravisDriver",
                 interpreter=find_python(given.python),
-                options=given.model_dump(exclude={"python", "command_deadline_s"}),
+                options={
+                    **given.model_dump(exclude={"python", "command_deadline_s", "addresses"}),
+                    "address": "",
+                },
                 open_deadline_s=10.0 + (given.ptp_wait_s if given.ptp else 0.0),
                 command_deadline_s=given.command_deadline_s,
             )
         )
+
+    def discover(self) -> Sequence[CameraInfo]:
+        """The cameras that answer now; their addresses are remembered for opening them."""
+        found = super().discover()
+        self._addresses.update({info.id: info.address for info in found})
+        return found
+
+    def spec_for(self, camera_id: str) -> WorkerSpec:
+        """How the worker of one camera is started: with its address, where that is known."""
+        address = self._addresses.get(camera_id, "")
+        return replace(self._spec, hints={"address": address})

@@ -19,7 +19,9 @@ def read_options(backend: str, model: type[OptionsT], given: Mapping[str, object
     try:
         return model.model_validate(given, strict=False)
     except ValidationError as error:
-        first = error.errors()[0]
+        # A misspelt key first: the key that is "missing" then is most often the same one.
+        wrong = sorted(error.errors(), key=lambda one: one["type"] != "extra_forbidden")
+        first = wrong[0]
         where = ".".join(str(part) for part in first["loc"]) or "options"
         raise InputError(
             "camera-option",

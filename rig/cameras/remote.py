@@ -52,6 +52,8 @@ class WorkerSpec:
     interpreter: str
     options: Mapping[str, object]
     environment: Mapping[str, str] = field(default_factory=dict)
+    hints: Mapping[str, object] = field(default_factory=dict)
+    """Options that help to find the camera when it is first opened; later they may mislead."""
     open_deadline_s: float = 15.0
     command_deadline_s: float = 2.0
 
@@ -82,7 +84,7 @@ class RemoteCamera:
         self._settings = CameraSettings()
         self._counts: Counter[str] = Counter()
         self._library_counts: Mapping[str, int] = {}
-        self._info, self._capabilities = self._start()
+        self._info, self._capabilities = self._start(spec.hints)
 
     @property
     def info(self) -> CameraInfo:
@@ -100,13 +102,14 @@ class RemoteCamera:
         link = self._link
         return link.pid if link else None
 
-    def _start(self) -> tuple[CameraInfo, CameraCapabilities]:
+    def _start(self, hints: Mapping[str, object]) -> tuple[CameraInfo, CameraCapabilities]:
         spec = self._spec
         link = WorkerLink(
             spec.interpreter, spec.driver, spec.environment, self._on_message, self._on_end
         )
         try:
-            told = link.ask("open", {"id": self._id, "options": spec.options}, spec.open_deadline_s)
+            args = {"id": self._id, "options": {**spec.options, **hints}}
+            told = link.ask("open", args, spec.open_deadline_s)
         except LinkDown as error:
             link.kill()
             raise self._gone(str(error)) from None
@@ -225,7 +228,7 @@ class RemoteCamera:
         if self._closed or (self._link is not None and not self._problem):
             return
         self._lose(self._problem)
-        self._info, self._capabilities = self._start()
+        self._info, self._capabilities = self._start({})
         self._counts["restarts"] += 1
         if self._settings != CameraSettings():
             self._configure(self._settings)

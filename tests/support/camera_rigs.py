@@ -7,6 +7,7 @@ pull its plug.
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import http.server
 import importlib.util
 import os
@@ -22,12 +23,21 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+import pytest
 
-from rig.cameras.base import CameraBackend, CameraDevice, CameraSettings, TriggerKind
+from rig.cameras.base import (
+    ArmSpec,
+    CameraBackend,
+    CameraDevice,
+    CameraSettings,
+    Frame,
+    TriggerKind,
+)
 from rig.cameras.registry import make_backend
 from rig.cameras.remote import RemoteCamera
 
 FAKE_GV = "arv-fake-gv-camera-0.8"
+LIFE_S = 240
 
 
 @dataclass
@@ -48,6 +58,12 @@ class CameraRig:
     """A frame is there after this time at the latest."""
     close: Callable[[], None] = lambda: None
 
+    def __enter__(self) -> CameraRig:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
 
 def free_running(device: CameraDevice) -> bool:
     return device.capabilities.trigger is TriggerKind.NONE and device.info.backend != "folder"
@@ -58,6 +74,27 @@ def fire(device: CameraDevice) -> None:
         device.software_trigger()
 
 
+SHOT = ArmSpec("capture", 1, 5.0)
+
+
+def shoot(rig: CameraRig, device: CameraDevice, count: int) -> list[Frame]:
+    """Arm and take pictures one after another."""
+    device.arm(dataclasses.replace(SHOT, shots=count))
+    frames: list[Frame] = []
+    for k in range(1, count + 1):
+        rig.shoot(device)
+        frames = list(device.wait_frames(k, rig.frame_s + 1.0))
+    return frames
+
+
+def assert_set(real: CameraSettings, wanted: CameraSettings, tolerance: float) -> None:
+    for name, value in dataclasses.asdict(wanted).items():
+        if isinstance(value, str):
+            assert getattr(real, name) == value
+        elif value is not None:
+            assert getattr(real, name) == pytest.approx(value, rel=tolerance)
+
+
 def crash(device: CameraDevice) -> None:
     """What a library does that kills its process."""
     assert isinstance(device, RemoteCamera)
@@ -66,7 +103,10 @@ def crash(device: CameraDevice) -> None:
 
 
 class FakeGigE:
-    """Aravis's fake GigE Vision camera as a process of its own."""
+    """Aravis's fake GigE Vision camera as a process of its own.
+
+    One at a time for each address: all listen at the same port.
+    """
 
     def __init__(self, serial: str, address: str = "127.0.0.1", lost_per_1000: int = 0) -> None:
         program = shutil.which(FAKE_GV)
@@ -74,17 +114,21 @@ class FakeGigE:
         options = ["-i", address, "-s", serial]
         if lost_per_1000:
             options += ["-r", str(lost_per_1000)]
-        self._command = [program, *options]
+        # Should the tests be killed, it ends by itself.
+        self._command = ["timeout", "-s", "KILL", str(LIFE_S), program, *options]
         self.start()
 
     def start(self) -> None:
-        self._process = subprocess.Popen(self._command, stdout=subprocess.DEVNULL)
+        self._process = subprocess.Popen(
+            self._command, stdout=subprocess.DEVNULL, start_new_session=True
+        )
         # It says nothing when it is ready; discovery waits a second for answers anyway.
         time.sleep(0.1)
 
     def stop(self) -> None:
-        self._process.kill()
-        self._process.wait()
+        if self._process.poll() is None:
+            os.killpg(self._process.pid, signal.SIGKILL)
+            self._process.wait()
 
 
 def aravis_rig(place: Path, serial: str = "RW01", **options: object) -> CameraRig:
@@ -158,7 +202,8 @@ def files_rig(place: Path) -> CameraRig:
     """Pictures of a file pattern as a webcam."""
     for k in range(100):
         assert cv2.imwrite(str(place / f"f_{k:04d}.png"), np.full((30, 40, 3), k, np.uint8))
-    backend = make_backend("opencv", {"sources": {"left": str(place / "f_%04d.png")}})
+    sources = {"left": str(place / "f_%04d.png")}
+    backend = make_backend("opencv", {"sources": sources, "command_deadline_s": 1.0})
     return CameraRig("files", backend, "left", fire, unplug=crash, close=backend.close)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import ipaddress
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Optional
@@ -44,6 +45,25 @@ def _found() -> list[dict[str, str]]:
         }
         for index in range(Aravis.get_n_devices())
     ]
+
+
+def _at(address: str, camera_id: str) -> tuple[Any, dict[str, str]] | None:
+    """The camera at a network address, if it is the one with this serial number."""
+    try:
+        ipaddress.ip_address(address)
+        camera = Aravis.Camera.new(address)
+        if camera.get_device_serial_number() != camera_id:
+            return None
+        info = {
+            "id": camera_id,
+            "model": camera.get_model_name(),
+            "vendor": camera.get_vendor_name(),
+            "address": address,
+            "protocol": "GigEVision",
+        }
+    except (ValueError, GLib.Error):
+        return None
+    return camera, info
 
 
 def _gone(why: str) -> DeviceError:
@@ -140,17 +160,24 @@ class AravisDriver:
 
     def open(self, camera_id: str) -> Mapping[str, Any]:
         """Take control of the camera with this serial number."""
-        found = [one for one in _found() if one["id"] == camera_id]
-        if not found:
-            raise _gone(f"none on the network or USB has the serial number {camera_id}")
         with _library():
-            self._camera = Aravis.Camera.new(found[0]["key"])
+            self._camera, info = self._reach(camera_id)
             self._nodes = AravisNodes(self._camera)
             self._camera.get_device().connect("control-lost", self._on_lost)
             # A free-running or half set up camera must stand still until it is armed.
             self._camera.stop_acquisition()
             self._set_up()
-        return {"info": found[0], "capabilities": self._capabilities(found[0]["protocol"])}
+        return {"info": info, "capabilities": self._capabilities(info["protocol"])}
+
+    def _reach(self, camera_id: str) -> tuple[Any, dict[str, str]]:
+        # Discovery takes a second: a known address saves it, and reaches through routers.
+        near = _at(self._options["address"], camera_id) if self._options["address"] else None
+        if near is not None:
+            return near
+        found = [one for one in _found() if one["id"] == camera_id]
+        if not found:
+            raise _gone(f"none on the network or USB has the serial number {camera_id}")
+        return Aravis.Camera.new(found[0]["key"]), found[0]
 
     def _set_up(self) -> None:
         options = self._options

@@ -13,9 +13,11 @@ import cv2
 from geometry.errors import DeviceError, InputError
 from rig.cameras.workers.serve import Picture
 
-FLUSH_FRAMES = 16
+FLUSH_FRAMES = 100
 WAITED_S = 0.004
-"""A grab that takes longer had to wait for the camera: nothing older is left in the buffers."""
+"""A grab that takes longer most likely had to wait for the camera, so the buffers are empty."""
+SURE_WAITS = 3
+"""So many one after another did; a single one may only tell of a busy machine."""
 V4L2_EXPOSURE_US = 100.0
 """V4L2 counts exposure in steps of 100 microseconds."""
 OPEN_MS, READ_MS = 5000, 2000
@@ -95,20 +97,20 @@ class OpencvDriver:
         """Empty the driver's buffers, so that the next frame is a fresh one."""
         with self._books:
             self._triggers.clear()
-        dropped = self._flush()
+        dropped = self._flush(SURE_WAITS)
         self._armed = True
         return dropped
 
-    def _flush(self) -> int:
-        """Let go of frames until one had to be waited for; how many were old."""
-        if not self._live:
-            return 0
-        for dropped in range(FLUSH_FRAMES):
+    def _flush(self, waits: int) -> int:
+        """Let go of frames until so many on end had to be waited for; how many were old."""
+        waited = 0
+        for grabbed in range(FLUSH_FRAMES if self._live else 0):
             began = time.monotonic()
             self._grab()
-            if time.monotonic() - began > WAITED_S:
-                return dropped
-        return FLUSH_FRAMES
+            waited = waited + 1 if time.monotonic() - began > WAITED_S else 0
+            if waited == waits:
+                return grabbed + 1 - waits
+        return FLUSH_FRAMES if self._live else 0
 
     def _grab(self) -> None:
         if not self._capture.grab():
@@ -182,7 +184,7 @@ class OpencvDriver:
         if gone or not self._capture.isOpened():
             raise _gone("its device is not there any more")
         if not self._armed:
-            self._flush()
+            self._flush(1)
         return {}
 
     def close(self) -> None:

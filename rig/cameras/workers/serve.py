@@ -154,21 +154,24 @@ class Worker:
             return self._step(driver, do, args)
 
     def _step(self, driver: Driver, do: str, args: Mapping[str, Any]) -> object:
-        if do == "arm":
-            dropped = driver.arm(int(args["shots"]))
-            self._arm_number, self._armed = int(args["number"]), True
-            return dropped
-        if do == "disarm":
-            self._armed = False
-            driver.disarm()
-            return None
-        if do == "configure":
-            return driver.configure(args["settings"])
+        if do in ("arm", "disarm", "configure"):
+            return self._change(driver, do, args)
         if do == "clock":
             return driver.clock(int(args["count"]))
         if do not in ("trigger", "collect", "ping"):
             raise InternalError("worker", f"unknown command '{do}'", "report this")
         return getattr(driver, do)()
+
+    def _change(self, driver: Driver, do: str, args: Mapping[str, Any]) -> object:
+        # Not armed while it changes: what fails half-way must not be fetched from.
+        was_armed, self._armed = self._armed, False
+        if do == "arm":
+            dropped = driver.arm(int(args["shots"]))
+            self._arm_number, self._armed = int(args["number"]), True
+            return dropped
+        if was_armed:
+            driver.disarm()
+        return driver.configure(args["settings"]) if do == "configure" else None
 
     @contextlib.contextmanager
     def _alone(self) -> Iterator[None]:

@@ -58,14 +58,14 @@ def test_a_mosaic_of_one_colour_is_that_colour(pattern: str, bits: int) -> None:
 def test_bytes_after_the_image_are_ignored_and_missing_ones_named() -> None:
     assert decode("Mono8", 2, 2, b"\1\2\3\4rest").tolist() == [[1, 2], [3, 4]]
     for name in ("Mono8", "Mono12", "Mono12p", "RGB8", "BayerRG8"):
-        with pytest.raises(ValueError, match="of"):
+        with pytest.raises(ValueError, match=r"of"):
             decode(name, 100, 100, b"short")
 
 
 @pytest.mark.parametrize("name", ["Mono8p", "Mono16p", "YUV422_8", "Mono9", "", "0x010c0006"])
 def test_formats_not_known_are_refused(name: str) -> None:
     assert not understood(name)
-    with pytest.raises(ValueError, match="not understood"):
+    with pytest.raises(ValueError, match=r"not understood"):
         decode(name, 1, 1, b"0000")
 
 

@@ -59,5 +59,5 @@ def test_lines_that_are_no_header_are_refused(line: bytes) -> None:
 
 
 def test_a_header_without_end_does_not_fill_the_memory() -> None:
-    with pytest.raises(wire.WireError, match="does not end"):
+    with pytest.raises(wire.WireError, match=r"does not end"):
         wire.receive(io.BytesIO(b"x" * (wire.MAX_HEADER + 10)))

@@ -183,9 +183,13 @@ def test_a_failure_while_fetching_is_told_and_ends_the_fetching(host: Host) -> N
 
 
 def test_a_worker_that_hangs_is_ended_in_time_and_started_again(tmp_path: Path) -> None:
-    place = files_rig(tmp_path)
-    camera = place.backend.open("left")
-    assert isinstance(camera, RemoteCamera)
+    with files_rig(tmp_path) as place:
+        camera = place.backend.open("left")
+        assert isinstance(camera, RemoteCamera)
+        hang_and_go_on(camera)
+
+
+def hang_and_go_on(camera: RemoteCamera) -> None:
     camera.arm(ArmSpec("a", 1, 1.0))
     hung = camera.worker_pid
     assert hung
@@ -193,29 +197,27 @@ def test_a_worker_that_hangs_is_ended_in_time_and_started_again(tmp_path: Path) 
     began = time.monotonic()
     with pytest.raises(DeviceError) as caught:
         camera.software_trigger()
-    assert time.monotonic() - began < 3.0 + 0.5  # the rig's command deadline and ending it
+    assert time.monotonic() - began < 1.0 + 0.5  # the rig's command deadline and ending it
     assert caught.value.code == "device/camera-gone"
-    assert "within 3 s" in str(caught.value)
+    assert "within 1 s" in str(caught.value)
     assert not psutil.pid_exists(hung)
     camera.arm(ArmSpec("b", 1, 1.0))
     camera.software_trigger()
     assert len(camera.wait_frames(1, 2.0)) == 1
     assert camera.health().counters["restarts"] == 1
-    place.close()
 
 
 def test_a_worker_that_hangs_is_seen_by_a_look_at_its_health(tmp_path: Path) -> None:
-    place = files_rig(tmp_path)
-    camera = place.backend.open("left")
-    assert isinstance(camera, RemoteCamera)
-    assert camera.worker_pid
-    os.kill(camera.worker_pid, signal.SIGSTOP)
-    began = time.monotonic()
-    health = camera.health()
-    assert time.monotonic() - began < 1.0
-    assert not health.connected
-    assert "no answer" in health.problem
-    place.close()
+    with files_rig(tmp_path) as place:
+        camera = place.backend.open("left")
+        assert isinstance(camera, RemoteCamera)
+        assert camera.worker_pid
+        os.kill(camera.worker_pid, signal.SIGSTOP)
+        began = time.monotonic()
+        health = camera.health()
+        assert time.monotonic() - began < 1.0
+        assert not health.connected
+        assert "no answer" in health.problem
 
 
 def test_no_worker_outlives_its_host(tmp_path: Path) -> None:
@@ -242,6 +244,6 @@ def test_no_worker_outlives_its_host(tmp_path: Path) -> None:
 
 def test_a_driver_that_cannot_be_loaded_says_why() -> None:
     spec = WorkerSpec("odd", "rig.cameras.workers.no_such_driver:X", sys.executable, {})
-    with pytest.raises(DeviceError, match="no_such_driver") as caught:
+    with pytest.raises(DeviceError, match=r"no_such_driver") as caught:
         RemoteCamera(spec, "a")
     assert caught.value.code == "device/camera-gone"
