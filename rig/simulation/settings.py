@@ -270,7 +270,8 @@ class SimulationSettings:
     0 renders in a thread of this process, None takes one for each core. ``trigger`` is ``edge``
     or ``software``. ``readout_ms`` passes from the end of an exposure to the frame's arrival.
     ``faults`` by camera name; ``"*"`` is for all that are not named. The cameras' clocks begin at
-    random and run at random up to ``clock_drift_ppm`` fast or slow.
+    random and run at random up to ``clock_drift_ppm`` fast or slow; their frame counters stand at
+    ``counter_start`` and begin again after ``counter_modulus`` values.
     """
 
     scene: SceneSettings = field(default_factory=SceneSettings)
@@ -285,6 +286,7 @@ class SimulationSettings:
     readout_ms: float = 30.0
     clock_drift_ppm: float = 20.0
     counter_modulus: int = 65536
+    counter_start: int = 0
     seed: int = 0
     render_limit_s: float = 120.0
 
@@ -294,6 +296,7 @@ class SimulationSettings:
         require_range("readout_ms", self.readout_ms, 0.0, 1e5)
         require_range("clock_drift_ppm", self.clock_drift_ppm, 0.0, 1e4)
         require_range("counter_modulus", self.counter_modulus, 2, 2**63)
+        require_range("counter_start", self.counter_start, 0, self.counter_modulus - 1)
         require_range("seed", self.seed, 0, 2**63)
         require_range("render_limit_s", self.render_limit_s, 1.0, 1e5)
         require_range("workers", self.workers or 0, 0, 1024)
