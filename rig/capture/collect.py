@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from geometry.errors import DeviceError
@@ -20,9 +21,12 @@ class Want:
     """What is wanted of one camera. Times are from ``start``, which is set just before FIRE.
 
     ``first_s``: when the first shot is; ``deadline_s``: when the last picture must be there.
+    ``pictures``: how many are waited for, fewer than ``shots`` once a burst is known to have been
+    stopped.
     """
 
     shots: int
+    pictures: Callable[[], int]
     interval_s: float
     first_s: float
     deadline_s: float
@@ -80,14 +84,14 @@ def _command(device: CameraDevice, want: Want, began: float) -> tuple[Bracket, .
 def _wait(device: CameraDevice, want: Want, began: float) -> tuple[Frame, ...]:
     frames: tuple[Frame, ...] = ()
     until = began + want.deadline_s
-    while len(frames) < want.shots and not want.give_up.is_set():
+    while len(frames) < want.pictures() and not want.give_up.is_set():
         left = until - time.monotonic()
         if left <= 0.0:
             return frames
-        frames = tuple(device.wait_frames(want.shots, min(SLICE_S, left)))
-        if len(frames) < want.shots and not device.health().connected:
+        frames = tuple(device.wait_frames(want.pictures(), min(SLICE_S, left)))
+        if len(frames) < want.pictures() and not device.health().connected:
             return frames
     if want.give_up.is_set():
         return frames
     # One more than wanted: returns at once when a picture turns up that nobody asked for.
-    return tuple(device.wait_frames(want.shots + 1, want.settle_s))
+    return tuple(device.wait_frames(len(frames) + 1, want.settle_s))

@@ -99,6 +99,7 @@ class CaptureRun:
     fate: Fate = Fate.NOT_FIRED
     _armed: list[str] = field(default_factory=list)
     _give_up: threading.Event = field(default_factory=threading.Event)
+    _pictures: int = 0
 
     def run(self) -> Firing:
         """Arm, fire and collect. :attr:`fate` says what is known of FIRE, also after an error.
@@ -189,6 +190,7 @@ class CaptureRun:
         faults: tuple[Fault, ...],
     ) -> Firing:
         self.progress(Progress("firing", 0.3))
+        self._pictures = self.order.shots
         start = threading.Event()
         jobs = {
             hand.plan.name: hand.do(partial(collect, want=self._want(hand, start)))
@@ -221,6 +223,7 @@ class CaptureRun:
         lead = 0.0 if self.station.trigger is None else self.station.trigger.lead_us
         return Want(
             shots=self.order.shots,
+            pictures=lambda: self._pictures,
             interval_s=self.order.interval_us / 1e6,
             first_s=(lead + self.station.shutter_delay_us(plan)) / 1e6,
             deadline_s=self._last_deadline_s() - policy.settle_s,
@@ -251,6 +254,9 @@ class CaptureRun:
             return None
         report = self.box.wait_done(request.capture_id, self._pulses_s(request) + BOX_MARGIN_S)
         self.fate = FATES[report.outcome]
+        if report.outcome is Outcome.PARTIAL:
+            # Nobody needs to wait for pictures of shots that were not made.
+            self._pictures = report.shots_done
         if report.outcome is Outcome.NOT_FIRED:
             self._stop_if_cancelled()
             raise problem or DeviceError(
