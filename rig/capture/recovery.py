@@ -68,8 +68,11 @@ def _record(folder: Path, listed: FileEntry) -> CaptureRecord:
     return read_model(CaptureRecord, data, listed.path)
 
 
-def recover_books(books: Books) -> tuple[Books, Recovery]:
-    """Deal with everything that is incomplete; doing it again changes nothing."""
+def recover_books(books: Books, known: InterruptedEntry | None = None) -> tuple[Books, Recovery]:
+    """Deal with everything that is incomplete; doing it again changes nothing.
+
+    ``known``: what is known of one capture, should it have to be set aside.
+    """
     left = books.folder / places.INCOMPLETE
     if not left.is_dir():
         return books, Recovery()
@@ -83,7 +86,9 @@ def recover_books(books: Books) -> tuple[Books, Recovery]:
             books = publish(books, record)
             committed.append(name)
         elif (stage / places.INTENT).exists() or books.interrupted(name) is not None:
-            books = set_aside(books, interrupted(name, "unknown", "the program was stopped"))
+            entry = interrupted(name, "unknown", "the program was stopped")
+            told = known is not None and known.capture_id == name
+            books = set_aside(books, known if told and known is not None else entry)
             aside.append(name)
         else:
             dropped.append(name)

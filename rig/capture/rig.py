@@ -21,6 +21,7 @@ from rig.capture.devices import DeviceMaker, StationDevices
 from rig.capture.faults import Fault
 from rig.capture.lags import estimate_lags, new_timings
 from rig.capture.opening import OpenCameras
+from rig.capture.records import CaptureRecord
 from rig.capture.results import CaptureResult, DryRun, RigHealth, SelfTest, SyncCheck
 from rig.capture.rigfacts import (
     focal_lengths_mm,
@@ -168,23 +169,28 @@ class Rig:
             run = self._run(order, progress, cancel, stage)
             shooting, evidence = self._shoot(run, stage, board or station_board(self.station))
             progress(Progress("writing", 0.8))
-            try:
-                record = stage.commit(
-                    shooting,
-                    evidence,
-                    self.station.policy,
-                    partial_allowed=partial,
-                    focal_mm=focal_lengths_mm(self._design),
-                )
-            except BaseException as error:
-                # What is left stays for recovery where even this cannot be written any more.
-                with contextlib.suppress(RigwrightError):
-                    session.tidy()
-                    if session.books.committed(capture_id) is None:
-                        stage.set_aside("fired", f"its pictures could not be written: {error}")
-                raise
+            record = self._commit(stage, shooting, evidence, partial)
             progress(Progress("committed", 1.0))
             return CaptureResult(record, session.folder)
+
+    def _commit(
+        self, stage: Stage, shooting: Shooting, evidence: Evidence, partial: bool
+    ) -> CaptureRecord:
+        try:
+            return stage.commit(
+                shooting,
+                evidence,
+                self.station.policy,
+                partial_allowed=partial,
+                focal_mm=focal_lengths_mm(self._design),
+            )
+        except RigwrightError as error:
+            # A passing trouble, or one after the moment that counts, need not lose a capture.
+            with contextlib.suppress(RigwrightError):
+                record = stage.settle(f"its pictures could not be written: {error.problem}")
+                if record is not None:
+                    return record
+            raise
 
     def _shoot(
         self, run: CaptureRun, stage: Stage, board: Board | None
@@ -301,7 +307,8 @@ class Rig:
     def _check_burst(self, shots: int, interval_us: float) -> None:
         check_burst(shots, interval_us)
         for camera in self.station.cameras if shots > 1 else ():
-            if 2.0 * camera.lag_tolerance_us >= interval_us:
+            latest = camera.expected_lag_us + camera.lag_tolerance_us
+            if latest - max(0.0, camera.expected_lag_us - camera.lag_tolerance_us) >= interval_us:
                 raise InputError(
                     "interval",
                     f"shots {interval_us / 1e3:g} ms apart cannot be told from each other by "

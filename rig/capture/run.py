@@ -99,6 +99,7 @@ class CaptureRun:
     fate: Fate = Fate.NOT_FIRED
     _armed: list[str] = field(default_factory=list)
     _give_up: threading.Event = field(default_factory=threading.Event)
+    _pictures: int = 0
 
     def run(self) -> Firing:
         """Arm, fire and collect. :attr:`fate` says what is known of FIRE, also after an error.
@@ -189,9 +190,10 @@ class CaptureRun:
         faults: tuple[Fault, ...],
     ) -> Firing:
         self.progress(Progress("firing", 0.3))
+        self._pictures = self.order.shots
         start = threading.Event()
         jobs = {
-            hand.plan.name: hand.do(partial(collect, want=self._want(hand, start)))
+            hand.plan.name: hand.do(partial(collect, want=self._want(hand, ready[hand.plan.name], start)))
             for hand in hands
         }
         self.fate = Fate.UNKNOWN
@@ -216,17 +218,19 @@ class CaptureRun:
             self.order, request, report, fired, wall, hands, ready, collected, absent, faults
         )
 
-    def _want(self, hand: CameraHand, start: threading.Event) -> Want:
+    def _want(self, hand: CameraHand, ready: Ready, start: threading.Event) -> Want:
         policy, plan = self.station.policy, hand.plan
         lead = 0.0 if self.station.trigger is None else self.station.trigger.lead_us
         return Want(
             shots=self.order.shots,
+            pictures=lambda: self._pictures,
             interval_s=self.order.interval_us / 1e6,
             first_s=(lead + self.station.shutter_delay_us(plan)) / 1e6,
             deadline_s=self._last_deadline_s() - policy.settle_s,
             settle_s=policy.settle_s,
             start=start,
             give_up=self._give_up,
+            ready_stamp=max((s.device_ns for s in ready.clock_samples), default=None),
         )
 
     def _fire_box(self, request: ArmRequest | None) -> DeviceError | None:
@@ -251,6 +255,9 @@ class CaptureRun:
             return None
         report = self.box.wait_done(request.capture_id, self._pulses_s(request) + BOX_MARGIN_S)
         self.fate = FATES[report.outcome]
+        if report.outcome is Outcome.PARTIAL:
+            # Nobody needs to wait for pictures of shots that were not made.
+            self._pictures = report.shots_done
         if report.outcome is Outcome.NOT_FIRED:
             self._stop_if_cancelled()
             raise problem or DeviceError(

@@ -19,7 +19,7 @@ from geometry.errors import ConflictError, InputError, NotFoundError
 from rig.capture import places
 from rig.capture.commit import Books, write_books
 from rig.capture.jsonfiles import entry
-from rig.capture.records import CaptureRecord, SessionFile
+from rig.capture.records import CaptureRecord, InterruptedEntry, SessionFile
 from rig.capture.recovery import Recovery, read_books, recover_books
 from rig.capture.storage import Disk, disk_errors
 from rig.designfile import program_version
@@ -136,10 +136,16 @@ class Session:
             )
         return self.books.committed(capture_id)
 
-    def tidy(self) -> None:
-        """Bring in order what a failed write of this very process left behind."""
-        with disk_errors(self.folder):
-            self.books, self.recovery = recover_books(self.books)
+    def tidy(self, known: InterruptedEntry | None = None) -> None:
+        """Bring in order what a failed write of this very process left behind.
+
+        What the disk says counts, not what this process believes: the failure may have come
+        after the capture was committed. ``known`` as for :func:`recover_books`.
+        """
+        if (self.folder / places.INCOMPLETE).exists():
+            with disk_errors(self.folder):
+                on_disk = read_books(self.folder, self.books.disk)
+                self.books, self.recovery = recover_books(on_disk, known)
 
     def require_space(self, least_mb: float) -> None:
         """Raise :class:`ConflictError` ``disk-full`` when less is free."""

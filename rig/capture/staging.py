@@ -71,6 +71,14 @@ class Stage:
             aside = interrupted(self._id, fate, why)
             self._session.books = set_aside(self._session.books, aside)
 
+    def settle(self, why: str) -> CaptureRecord | None:
+        """After a failed commit of what was fired: committed after all, or set aside.
+
+        Raises when the disk fails still; the next opening of the session then settles it.
+        """
+        self._session.tidy(interrupted(self._id, "fired", why))
+        return self._session.books.committed(self._id)
+
     def commit(
         self,
         shooting: Shooting,
