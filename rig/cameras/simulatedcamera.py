@@ -104,6 +104,7 @@ class SimulatedCamera:
             frame_counter=True,
             frame_counter_modulus=self._simulation.counter_modulus,
             settable=SETTABLE,
+            wait_overrun_s=self._simulation.render_limit_s,
         )
 
     def configure(self, settings: CameraSettings) -> CameraSettings:

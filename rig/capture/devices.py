@@ -7,7 +7,10 @@ import time
 from collections.abc import Mapping
 from typing import Any, Protocol
 
+from geometry.errors import InputError
 from rig.cameras.base import CameraBackend
+from rig.capture.rigfacts import read_rig_design
+from rig.station.simulation import simulation_settings
 from rig.station.spec import Station, TriggerPlan
 from rig.trigger.box import TriggerBox
 
@@ -36,14 +39,15 @@ class StationDevices:
 
     def make_box(self, plan: TriggerPlan) -> TriggerBox:
         """The driver of the box that ``plan`` names."""
+        from rig.trigger.driver import BoxAddress, SerialTriggerBox
+
         url = self._fake_url(plan) if plan.url.startswith("fake:") else plan.url
+        address = BoxAddress(url, plan.serial_number or "")
         if plan.backend == "esper":
             from rig.trigger.esper import EsperTriggerBox
 
-            return EsperTriggerBox(url)
-        from rig.trigger.driver import BoxAddress, SerialTriggerBox
-
-        return SerialTriggerBox(BoxAddress(url, plan.serial_number or ""))
+            return EsperTriggerBox(address)
+        return SerialTriggerBox(address)
 
     def _fake_url(self, plan: TriggerPlan) -> str:
         """A box made of nothing, on a pseudo-terminal of this process."""
@@ -65,8 +69,20 @@ class StationDevices:
 
     def _options(self, name: str, station: Station, box: TriggerBox | None) -> Mapping[str, Any]:
         options = dict(station.backend_options.get(name, {}))
-        return options
+        return options | _simulated(station, box) if name == "simulated" else options
 
     def close(self) -> None:
         """End the fake box, where there is one."""
         self._beside.close()
+
+
+def _simulated(station: Station, box: TriggerBox | None) -> dict[str, Any]:
+    """What simulated cameras need beyond their section: the rig itself, and the box to hear."""
+    cameras = tuple(read_rig_design(station).cameras.values())
+    if not cameras:
+        raise InputError(
+            "simulation-no-design",
+            "simulated cameras stand where a design puts them, and the station names none",
+            'add design = "design.json"',
+        )
+    return {"cameras": cameras, "settings": simulation_settings(station), "box": box}

@@ -206,7 +206,8 @@ class CaptureRun:
                 wall = datetime.fromtimestamp(time.time(), UTC).astimezone()
                 report = self._await_box(problem, request)
                 self.progress(Progress("waiting for pictures", 0.4))
-                collected, problems = outcomes(jobs, self._last_deadline_s() + BOX_MARGIN_S)
+                patience_s = self._last_deadline_s() + BOX_MARGIN_S + _overrun_s(hands)
+                collected, problems = outcomes(jobs, patience_s)
         finally:
             # The camera threads must not go on waiting for pictures that nobody will take.
             self._give_up.set()
@@ -314,6 +315,10 @@ class CaptureRun:
                 with contextlib.suppress(RigwrightError):
                     self.box.disarm(name)
         do_all(self.hands, lambda device: device.disarm(), self.station.policy.ready_deadline_s)
+
+
+def _overrun_s(hands: tuple[CameraHand, ...]) -> float:
+    return max((hand.device.capabilities.wait_overrun_s for hand in hands), default=0.0)
 
 
 def _arm(device: CameraDevice, settings: CameraSettings, spec: ArmSpec) -> Ready:
