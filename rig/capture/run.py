@@ -193,7 +193,9 @@ class CaptureRun:
         self._pictures = self.order.shots
         start = threading.Event()
         jobs = {
-            hand.plan.name: hand.do(partial(collect, want=self._want(hand, ready[hand.plan.name], start)))
+            hand.plan.name: hand.do(
+                partial(collect, want=self._want(hand, ready[hand.plan.name], start))
+            )
             for hand in hands
         }
         self.fate = Fate.UNKNOWN
