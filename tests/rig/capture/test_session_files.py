@@ -324,7 +324,7 @@ def test_a_design_says_how_large_pictures_are(
     made = bench(memory_station(len(design.cameras), design=path))
     record = made.rig.capture(made.session, "one").record
     assert {fault.kind for fault in record.faults} == {"wrong-size"}
-    with pytest.raises(InputError, match="camera 'cam08' of the station is not in design.json"):
+    with pytest.raises(InputError, match=r"camera 'cam08' of the station is not in design\.json"):
         bench(memory_station(len(design.cameras) + 1, design=path))
 
 
