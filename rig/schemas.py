@@ -1,7 +1,8 @@
 """JSON schemas and key tables of the files, generated from the models that read them.
 
-``python -m rig.schemas DOCS`` writes ``rig.schema.json`` and ``design.schema.json`` to the
-folder DOCS and renews the tables between the marks in ``rig-file.md`` and ``design-file.md``.
+``python -m rig.schemas DOCS`` writes the schemas of rig files, design files, station files,
+sessions and captures to the folder DOCS and renews the tables between the marks in
+``rig-file.md``, ``design-file.md`` and ``station-file.md``.
 """
 
 from __future__ import annotations
@@ -17,8 +18,10 @@ from typing import Any
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
+from rig.capture.records import CaptureRecord, SessionFile
 from rig.designmodel import DesignFile
 from rig.rigfile import RigFile
+from rig.station.stationfile import StationFile
 from rig.strict import child_model, key_of
 
 BEGIN, END = "<!-- keys -->", "<!-- end of keys -->"
@@ -95,9 +98,14 @@ def with_key_table(text: str, model: type[BaseModel]) -> str:
 def documents(docs: Path) -> dict[Path, str]:
     """What each generated file in the folder ``docs`` should hold."""
     rig_file, design_file = docs / "rig-file.md", docs / "design-file.md"
+    station_file = docs / "station-file.md"
     return {
         docs / "rig.schema.json": schema_text(RigFile, "Rigwright rig file"),
         docs / "design.schema.json": schema_text(DesignFile, "Rigwright design file"),
+        docs / "station.schema.json": schema_text(StationFile, "Rigwright station file"),
+        docs / "session.schema.json": schema_text(SessionFile, "Rigwright session"),
+        docs / "capture.schema.json": schema_text(CaptureRecord, "Rigwright capture"),
+        station_file: with_key_table(station_file.read_text(encoding="utf-8"), StationFile),
         rig_file: with_key_table(rig_file.read_text(encoding="utf-8"), RigFile),
         design_file: with_key_table(design_file.read_text(encoding="utf-8"), DesignFile),
     }

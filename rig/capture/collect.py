@@ -83,9 +83,7 @@ def _command(device: CameraDevice, want: Want, began: float) -> tuple[Bracket, .
     return tuple(sent)
 
 
-def _wait(
-    device: CameraDevice, want: Want, began: float, start_ns: int
-) -> tuple[Frame, ...]:
+def _wait(device: CameraDevice, want: Want, began: float, start_ns: int) -> tuple[Frame, ...]:
     frames: tuple[Frame, ...] = ()
     until = began + want.deadline_s
     while wanted(frames, want, start_ns) < want.pictures() and not want.give_up.is_set():

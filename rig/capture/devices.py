@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Mapping
-from typing import Any, Protocol
+from typing import Protocol
 
-from geometry.errors import InputError
 from rig.cameras.base import CameraBackend
-from rig.capture.rigfacts import read_rig_design
+from rig.capture.rigfacts import simulated_cameras
 from rig.station.simulation import simulation_settings
 from rig.station.spec import Station, TriggerPlan
 from rig.trigger.box import TriggerBox
+
+SIMULATED = "simulated"
 
 
 class DeviceMaker(Protocol):
@@ -39,15 +39,12 @@ class StationDevices:
 
     def make_box(self, plan: TriggerPlan) -> TriggerBox:
         """The driver of the box that ``plan`` names."""
-        from rig.trigger.driver import BoxAddress, SerialTriggerBox
-
         url = self._fake_url(plan) if plan.url.startswith("fake:") else plan.url
-        address = BoxAddress(url, plan.serial_number or "")
-        if plan.backend == "esper":
-            from rig.trigger.esper import EsperTriggerBox
+        from rig.trigger.driver import BoxAddress, SerialTriggerBox
+        from rig.trigger.esper import EsperTriggerBox
 
-            return EsperTriggerBox(address)
-        return SerialTriggerBox(address)
+        address = BoxAddress(url, plan.serial_number or "")
+        return EsperTriggerBox(address) if plan.backend == "esper" else SerialTriggerBox(address)
 
     def _fake_url(self, plan: TriggerPlan) -> str:
         """A box made of nothing, on a pseudo-terminal of this process."""
@@ -65,24 +62,15 @@ class StationDevices:
         """The backend of that name with the station's options for it."""
         from rig.cameras.registry import make_backend
 
-        return make_backend(name, self._options(name, station, box))
-
-    def _options(self, name: str, station: Station, box: TriggerBox | None) -> Mapping[str, Any]:
         options = dict(station.backend_options.get(name, {}))
-        return options | _simulated(station, box) if name == "simulated" else options
+        if name == SIMULATED:
+            options |= {
+                "cameras": list(simulated_cameras(station).values()),
+                "settings": simulation_settings(station),
+                "box": box,
+            }
+        return make_backend(name, options)
 
     def close(self) -> None:
         """End the fake box, where there is one."""
         self._beside.close()
-
-
-def _simulated(station: Station, box: TriggerBox | None) -> dict[str, Any]:
-    """What simulated cameras need beyond their section: the rig itself, and the box to hear."""
-    cameras = tuple(read_rig_design(station).cameras.values())
-    if not cameras:
-        raise InputError(
-            "simulation-no-design",
-            "simulated cameras stand where a design puts them, and the station names none",
-            'add design = "design.json"',
-        )
-    return {"cameras": cameras, "settings": simulation_settings(station), "box": box}

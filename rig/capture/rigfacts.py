@@ -50,6 +50,21 @@ def read_rig_design(station: Station) -> RigDesign:
     return RigDesign(named, Path(station.design).read_bytes())
 
 
+def simulated_cameras(station: Station) -> Mapping[str, RigCamera]:
+    """What the simulated backend has to know of its cameras: where they stand and what they are.
+
+    Raises :class:`InputError` for a station without a design.
+    """
+    design = read_rig_design(station)
+    if not design.cameras:
+        raise InputError(
+            "station-no-design",
+            "simulated cameras need a design, which says where they stand",
+            'make one with `rigwright design` and name it: design = "design.json"',
+        )
+    return design.cameras
+
+
 def picture_sizes(station: Station, design: RigDesign) -> dict[str, tuple[int, int]]:
     """What each camera's pictures must measure, as far as that is known."""
     sizes = {name: placed.camera.image_size_px for name, placed in design.cameras.items()}

@@ -193,7 +193,7 @@ class CaptureRun:
         self._pictures = self.order.shots
         start = threading.Event()
         jobs = {
-            hand.plan.name: hand.do(partial(collect, want=self._want(hand, ready[hand.plan.name], start)))
+            hand.plan.name: hand.do(partial(collect, want=self._want(hand, ready, start)))
             for hand in hands
         }
         self.fate = Fate.UNKNOWN
@@ -219,8 +219,9 @@ class CaptureRun:
             self.order, request, report, fired, wall, hands, ready, collected, absent, faults
         )
 
-    def _want(self, hand: CameraHand, ready: Ready, start: threading.Event) -> Want:
+    def _want(self, hand: CameraHand, ready: Mapping[str, Ready], start: threading.Event) -> Want:
         policy, plan = self.station.policy, hand.plan
+        samples = ready[plan.name].clock_samples
         lead = 0.0 if self.station.trigger is None else self.station.trigger.lead_us
         return Want(
             shots=self.order.shots,
@@ -231,7 +232,7 @@ class CaptureRun:
             settle_s=policy.settle_s,
             start=start,
             give_up=self._give_up,
-            ready_stamp=max((s.device_ns for s in ready.clock_samples), default=None),
+            ready_stamp=max((sample.device_ns for sample in samples), default=None),
         )
 
     def _fire_box(self, request: ArmRequest | None) -> DeviceError | None:

@@ -1,4 +1,4 @@
-"""The ``[simulation]`` section: the simulated backend's own settings, read as strictly as the rest."""
+"""The ``[simulation]`` section: the simulated backend's own settings, read strictly too."""
 
 from __future__ import annotations
 
@@ -55,7 +55,8 @@ def _with_wiring(data: dict[str, Any], station: Station) -> dict[str, Any]:
 def read_settings(kind: type[Any], data: Mapping[str, Any], where: str = "simulation") -> Any:  # noqa: ANN401  an object of ``kind``
     """A frozen settings object of ``kind`` from parsed TOML; unknown keys are errors."""
     # A dataclass within a model is read under the model's configuration, strictness included.
-    holder = create_model("Holder", __config__=STRICT, **{where: (kind, ...)})
+    fields: dict[str, Any] = {where: (kind, ...)}
+    holder = create_model("Holder", __config__=STRICT, **fields)
     try:
         # As JSON: strict Python input would want tuples and paths, which TOML does not have.
         return getattr(holder.model_validate_json(json.dumps({where: data}, default=str)), where)

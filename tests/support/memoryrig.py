@@ -216,7 +216,7 @@ class MemoryCamera:
         self.gone = False
         self.settings = CameraSettings(exposure_us=script.exposure_us)
         self._info = info
-        self._random = random.Random(seed)
+        self._random = random.Random(seed)  # noqa: S311  faults, not secrets
         self._origin_ns = self._random.randrange(10**12)
         self._counter = script.first_counter
         self._frames: list[Frame] = []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 from dataclasses import replace
 
 import pytest
@@ -98,9 +99,7 @@ def test_swapped_cables_of_equal_delay_do_no_harm(bench: BenchMaker) -> None:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_random_bursts_with_random_faults_have_no_wrong_pair(bench: BenchMaker, seed: int) -> None:
-    import random
-
-    draw = random.Random(seed)
+    draw = random.Random(seed)  # noqa: S311  faults, not secrets
     station = with_policy(memory_station(4), frame_deadline_s=0.1, settle_s=0.005)
 
     def some() -> frozenset[int]:

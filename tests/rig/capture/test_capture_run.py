@@ -112,7 +112,7 @@ def test_a_camera_that_hangs_while_arming_is_not_waited_for(bench: BenchMaker) -
     station = with_policy(memory_station(), ready_deadline_s=0.15)
     made = bench(station, {"cam03": CameraScript(arm_hangs_s=0.6)})
     began = time.monotonic()
-    with pytest.raises(DeviceError, match="cam03: it did not answer within 0.15 s"):
+    with pytest.raises(DeviceError, match=r"cam03: it did not answer within 0\.15 s"):
         made.rig.capture(made.session, "smile")
     assert time.monotonic() - began < 0.5
     assert not made.box.fired

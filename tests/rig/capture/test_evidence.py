@@ -71,9 +71,7 @@ def shooting(
         pairing = Pairing(plan.name, pairs, ())
         parts.append(CameraPart(plan, info, CameraSettings(), take, pairing))
     now = datetime(2026, 11, 22, tzinfo=UTC)
-    return Shooting(
-        "c", shots, 5e4, now, START, request, report, shots, tuple(parts)
-    )
+    return Shooting("c", shots, 5e4, now, START, request, report, shots, tuple(parts))
 
 
 def pair_of(
@@ -238,9 +236,7 @@ def pictured(shot: Shooting) -> Shooting:
     pixels = np.zeros((4, 4), np.uint8)
     parts = []
     for part in shot.parts:
-        pairs = tuple(
-            replace(p, frame=replace(p.frame, pixels=pixels)) for p in part.pairing.pairs
-        )
+        pairs = tuple(replace(p, frame=replace(p.frame, pixels=pixels)) for p in part.pairing.pairs)
         parts.append(replace(part, pairing=replace(part.pairing, pairs=pairs)))
     return replace(shot, parts=tuple(parts))
 

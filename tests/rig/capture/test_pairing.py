@@ -280,8 +280,8 @@ def stories(draw: st.DrawFn) -> tuple[Take, dict[str, bool]]:
     for k in range(shots):
         lag_us = LAG_US + bias + draw(st.floats(-300.0, 300.0))
         events.append((START + k * INTERVAL_NS + round(lag_us * 1000), k + 1, draw(FATES)))
-    for off_ms in draw(st.lists(st.floats(-200.0, 150.0), max_size=3)):
-        events.append((START + round(off_ms * MS), 0, "sound"))
+    strays = draw(st.lists(st.floats(-200.0, 150.0), max_size=3))
+    events += [(START + round(off_ms * MS), 0, "sound") for off_ms in strays]
     frames: list[Frame] = []
     for at, shot, fate in sorted(events):
         if fate == "miss":

@@ -207,6 +207,6 @@ def test_whatever_is_given_ends_in_a_station_or_one_line(change: dict[str, Any])
     try:
         station = station_from_mapping({**data(), **change})
     except InputError as error:
-        assert "\n" not in str(error)  # noqa: PT017  the other way out is a sound station
+        assert "\n" not in str(error)
     else:
         assert isinstance(station, Station)
