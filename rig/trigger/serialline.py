@@ -56,7 +56,7 @@ class PortLock:
         real = os.path.realpath(name) if is_device_path(url) else name
         digest = hashlib.sha256(real.encode()).hexdigest()[:16]
         path = Path(tempfile.gettempdir()) / f"rigwright-trigger-{digest}.lock"
-        self._handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+        self._handle = _lock_file(path)
         try:
             fcntl.flock(self._handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
@@ -74,6 +74,20 @@ class PortLock:
     def release(self) -> None:
         """Let go."""
         os.close(self._handle)
+
+
+def _lock_file(path: Path) -> int:
+    """The file, for all users.
+
+    A kernel that protects shared folders lets nobody create over another's file, only open it.
+    """
+    while True:
+        with suppress(FileNotFoundError):
+            return os.open(path, os.O_RDWR | os.O_CLOEXEC)
+        with suppress(FileExistsError):
+            handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC)
+            os.fchmod(handle, 0o666)
+            return handle
 
 
 class SerialLine:
