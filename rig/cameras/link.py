@@ -33,6 +33,10 @@ class LinkDown(Exception):  # noqa: N818  a state of the link, which its user tu
     """The worker is gone or did not answer in time."""
 
 
+class LinkSilent(LinkDown):
+    """The worker did not answer in time; it may yet."""
+
+
 class WorkerLink:
     """One worker process. Any thread may ask; answers are told apart by number."""
 
@@ -77,8 +81,8 @@ class WorkerLink:
     def ask(self, do: str, args: Mapping[str, object], deadline_s: float) -> Any:  # noqa: ANN401
         """The answer to one command.
 
-        Raises :class:`LinkDown` when none comes in time, and the worker's own error when it
-        answers with one.
+        Raises :class:`LinkSilent` when none comes in time, :class:`LinkDown` when none will
+        come, and the worker's own error when it answers with one.
         """
         answer: Future[Any] = Future()
         with self._books:
@@ -91,7 +95,7 @@ class WorkerLink:
             self._write({"n": number, "do": do, "args": args})
             return answer.result(deadline_s)
         except FutureTimeoutError:
-            raise LinkDown(f"no answer to '{do}' within {deadline_s:g} s") from None
+            raise LinkSilent(f"no answer to '{do}' within {deadline_s:g} s") from None
         finally:
             with self._books:
                 self._answers.pop(number, None)

@@ -30,14 +30,14 @@ from rig.cameras.base import (
     TimestampKind,
     TriggerKind,
 )
-from rig.cameras.link import LinkDown, WorkerLink
+from rig.cameras.link import LinkDown, LinkSilent, WorkerLink
 from rig.cameras.workers import wire
 
 logger = logging.getLogger(__name__)
 
 SPARE_FRAMES = 16
 """Frames kept beyond those asked for; a camera that runs freely must not fill the memory."""
-PING_S = 0.5
+PING_S = 1.0
 
 
 @dataclass(frozen=True)
@@ -78,6 +78,8 @@ class RemoteCamera:
         self._fired_ns = 0
         self._problem = ""
         """Why the worker is of no use any more; it is replaced at the next command."""
+        self._silence = ""
+        """What the last look at its health waited for in vain; a later look may be luckier."""
         self._note = ""
         """What is wrong with a camera that still answers."""
         self._closed = False
@@ -118,7 +120,7 @@ class RemoteCamera:
             if isinstance(error, DeviceError) and error.detail == "camera-gone":
                 raise self._gone(error.problem) from None
             raise
-        self._link, self._problem = link, ""
+        self._link, self._problem, self._silence = link, "", ""
         return read_info(spec.backend, told["info"]), read_capabilities(told["capabilities"])
 
     def _gone(self, why: str) -> DeviceError:
@@ -225,9 +227,10 @@ class RemoteCamera:
 
     def _revive(self) -> None:
         """Start again what was lost, with the settings it had."""
-        if self._closed or (self._link is not None and not self._problem):
+        doubt = self._problem or self._silence
+        if self._closed or (self._link is not None and not doubt):
             return
-        self._lose(self._problem)
+        self._lose(doubt)
         self._info, self._capabilities = self._start({})
         self._counts["restarts"] += 1
         if self._settings != CameraSettings():
@@ -318,14 +321,14 @@ class RemoteCamera:
             return tuple(ClockSample(*reading) for reading in self._ask("clock", {"count": count}))
 
     def health(self) -> CameraHealth:
-        """How it is: asks the camera when no command is under way, for at most half a second."""
+        """How it is: asks the camera when no command is under way, for at most a second."""
         if self._commands.acquire(timeout=0.01):
             try:
                 self._ping()
             finally:
                 self._commands.release()
         with self._news:
-            gone = "it was closed" if self._closed else self._problem
+            gone = "it was closed" if self._closed else self._problem or self._silence
             return CameraHealth(
                 connected=not gone,
                 armed=self._armed is not None and not gone,
@@ -338,7 +341,10 @@ class RemoteCamera:
         if self._closed or link is None or self._problem:
             return
         try:
+            self._silence = ""
             self._library_counts = link.ask("ping", {}, PING_S)
+        except LinkSilent as error:
+            self._silence = str(error)
         except LinkDown as error:
             self._lose(str(error))
         except DeviceError as error:

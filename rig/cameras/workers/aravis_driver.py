@@ -19,6 +19,8 @@ from gi.repository import Aravis, GLib  # noqa: E402
 
 GVSP_IDS = 65535
 """Frame ids of GigE Vision are 1 to 65535; 0 is none."""
+CONTROL_REGISTER, CONTROL_BITS = 0x0A00, 0x3
+"""Who controls a GigE Vision camera: exclusive access and control access."""
 KEPT_BUFFERS = 16
 COUNTERS = (
     "n_completed_buffers",
@@ -28,7 +30,15 @@ COUNTERS = (
     "n_missing_packets",
     "n_resent_packets",
 )
-GONE_WORDS = ("timeout", "not-connected", "not connected", "lost", "no device", "no such device")
+GONE_WORDS = (
+    "timeout",
+    "access",
+    "not-connected",
+    "not connected",
+    "lost",
+    "no device",
+    "no such device",
+)
 
 
 def _found() -> list[dict[str, str]]:
@@ -222,6 +232,7 @@ class AravisDriver:
 
     def arm(self, shots: int) -> int:
         """Start streaming with an empty queue; frames of before are counted and dropped."""
+        self._check_control()
         with _library():
             dropped = self._stop()
             self._stream = self._camera.create_stream(None, None)
@@ -235,6 +246,17 @@ class AravisDriver:
             self._running = True
         self._fired.clear()
         return dropped
+
+    def _check_control(self) -> None:
+        """A camera that was without power answers again, but has forgotten us and its settings."""
+        if self._lost:
+            raise _gone(self._lost)
+        with _library():
+            network = self._camera.is_gv_device()
+            value = self._camera.get_device().read_register(CONTROL_REGISTER if network else 0)
+        if network and not value & CONTROL_BITS:
+            self._lost = "it was started anew"
+            raise _gone(self._lost)
 
     def _stop(self) -> int:
         """Stop streaming; returns how many frames had come and were not fetched."""
@@ -307,11 +329,8 @@ class AravisDriver:
         return found or self._brackets[-count:]
 
     def ping(self) -> Mapping[str, int]:
-        """Read a register; the stream's counters."""
-        if self._lost:
-            raise _gone(self._lost)
-        with _library():
-            self._camera.get_device().read_register(0)
+        """Whether we still control it; the stream's counters."""
+        self._check_control()
         stream = self._stream
         if stream is None:
             return {}

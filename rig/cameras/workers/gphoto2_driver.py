@@ -278,10 +278,14 @@ class GphotoDriver:
         return ()
 
     def ping(self) -> Mapping[str, int]:
-        """Free room, unless the body waits for the box: then it must be left alone."""
+        """Free room, while it is not armed.
+
+        An armed body must be left alone until the box is done, and then to :meth:`poll`, which
+        tells when it is gone.
+        """
         if self._full_room is not None:
             raise _card_full()
-        if self._armed and self._collecting_since is None:
+        if self._armed:
             return {}
         with _library():
             # Answers from the body itself; a name that is not there is an answer too.

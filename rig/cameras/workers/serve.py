@@ -24,6 +24,9 @@ POLL_S = 0.05
 LAST_GRACE_S = 3.0
 """Time to let go of the camera after the host went; a library that hangs is left behind."""
 
+BESIDE = ("ping", "collect")
+"""Commands that never wait for the fetching."""
+
 Picture = tuple[wire.Header, bytes]
 """Description of a frame and its bytes."""
 
@@ -32,7 +35,7 @@ class Driver(Protocol):
     """One camera as its library shows it. Plain values only: they cross to the host as JSON."""
 
     shares_library: bool
-    """Whether :meth:`trigger`, :meth:`clock` and :meth:`ping` may run while frames are fetched."""
+    """Whether :meth:`trigger` and :meth:`clock` may run while frames are fetched."""
 
     def open(self, camera_id: str) -> Mapping[str, Any]:
         """Take hold of a camera: ``info`` and ``capabilities``."""
@@ -51,7 +54,7 @@ class Driver(Protocol):
         ...
 
     def collect(self) -> None:
-        """The trigger has gone: frames may be fetched."""
+        """The trigger has gone: frames may be fetched. Runs beside :meth:`poll`."""
         ...
 
     def poll(self, timeout_s: float) -> Sequence[Picture]:
@@ -67,7 +70,10 @@ class Driver(Protocol):
         ...
 
     def ping(self) -> Mapping[str, int]:
-        """Ask the camera for a sign of life; counters of the library."""
+        """Ask the camera for a sign of life; counters of the library. Runs beside :meth:`poll`.
+
+        Must not wait for a download: whoever asks takes a late answer for a camera that is gone.
+        """
         ...
 
     def close(self) -> None:
@@ -148,7 +154,8 @@ class Worker:
         return self._driver.open(str(args["id"]))
 
     def _drive(self, driver: Driver, do: str, args: Mapping[str, Any]) -> object:
-        if do in ("trigger", "clock", "ping", "collect") and driver.shares_library:
+        beside = ("ping", "collect", "trigger", "clock") if driver.shares_library else BESIDE
+        if do in beside:
             return self._step(driver, do, args)
         with self._alone():
             return self._step(driver, do, args)

@@ -19,6 +19,7 @@ from rig.cameras.aravis import INSTALL, AravisBackend, find_python
 from rig.cameras.base import (
     ArmSpec,
     CameraDevice,
+    CameraSettings,
     FrameStatus,
     TriggerKind,
 )
@@ -106,6 +107,22 @@ def name_the_loss(world: CameraRig) -> None:
     began = time.monotonic()
     assert camera.wait_frames(1, 1.0) == ()
     assert time.monotonic() - began < 0.2
+
+
+def test_a_camera_that_was_without_power_is_set_up_again(tmp_path: Path) -> None:
+    with aravis_rig(tmp_path, "RW16") as world:
+        camera = world.backend.open("RW16")
+        camera.configure(CameraSettings(exposure_us=4321.0))
+        world.unplug(camera)
+        assert world.plug
+        world.plug()
+        # It answers, so only its having forgotten who controls it tells.
+        assert camera.health().problem == "the camera does not answer (it was started anew)"
+        camera.arm(ArmSpec("again", 1, 1.0))
+        assert camera.wait_frames(1, 3 * FAKE_PERIOD_S) == ()
+        camera.software_trigger()
+        (frame,) = camera.wait_frames(1, 1.0)
+        assert frame.exposure_us == 4321.0
 
 
 def test_a_line_the_camera_has_not_is_refused(tmp_path: Path) -> None:

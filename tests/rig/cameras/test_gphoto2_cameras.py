@@ -65,6 +65,7 @@ def test_nothing_is_asked_of_a_body_between_arming_and_waiting(edge: CameraRig) 
     assert "free_images" not in health.counters
     assert "frames" not in health.counters
     assert len(camera.wait_frames(1, 2.0)) == 1
+    camera.disarm()
     assert camera.health().counters["free_images"] > 0
 
 
