@@ -171,7 +171,7 @@ def test_late_edges_are_owned_up_to(js_box: FirmwareSim) -> None:
 def test_time_is_answered_at_its_instant(box: FirmwareSim, firing: bool) -> None:
     epoch = _cycle_of_tick_0(box)
     if firing:
-        burst = Burst({output: (output * 33, 900) for output in ALL}, shots=60, interval=3501)
+        burst = Burst({output: (output * 50, 1025) for output in ALL}, shots=60, interval=3901)
         arm(box, "a", burst)
         fire(box, "a")
     box.run(5.0)
