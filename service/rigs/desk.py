@@ -5,6 +5,7 @@ from __future__ import annotations
 import queue
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -90,10 +91,16 @@ class RigDesk:
 
     def abort(self) -> None:
         """All outputs low, now; what is being done ends. Allowed always, waits for nobody."""
-        rig = self._rig
+        rig, doing = self._rig, self._doing
         if rig is None:
             raise self._not_open()
-        rig.abort()
+        try:
+            rig.abort()
+        finally:
+            if doing is not None:
+                # Whoever reads the job must see that somebody ended it.
+                with suppress(ConflictError):
+                    self._books.cancels.cancel(doing.id, doing.kind)
 
     def begin(self, new: NewJob, job_id: str, work: Work) -> tuple[JobRecord, bool]:
         """Begin a job, and whether it is new; the same request again gives the job there is.
