@@ -145,9 +145,7 @@ def test_lags_are_found_by_stamps_and_by_light_and_written_back(tmp_path: Path) 
         ("unplug_at_shot = 1", {"missing"}),
     ],
 )
-def test_faults_of_simulated_cameras_are_named(
-    tmp_path: Path, fault: str, kinds: set[str]
-) -> None:
+def test_faults_of_simulated_cameras_are_named(tmp_path: Path, fault: str, kinds: set[str]) -> None:
     with opened(tmp_path, faults(cam02=fault)) as (rig, _):
         rig.station = replace(
             rig.station, board=None, policy=replace(rig.station.policy, frame_deadline_s=2.0)
@@ -175,3 +173,63 @@ def test_the_simulation_section_is_read_strictly(tmp_path: Path) -> None:
         with pytest.raises(InputError) as error:
             simulation_settings(read_station(path))
         assert word in str(error.value)
+
+
+FOLDER_STATION = """
+schema = "rigwright.station/1"
+[trigger]
+url = "fake:"
+[[camera]]
+name = "left"
+backend = "folder"
+id = "left"
+output = 1
+[[camera]]
+name = "right"
+backend = "folder"
+id = "right"
+output = 2
+[capture]
+frame_deadline_s = 3.0
+settle_s = 0.01
+min_free_mb = 1.0
+[backend.folder]
+root = "{root}"
+trigger = "edge"
+settle_s = 0.05
+"""
+
+
+def test_files_that_tethering_software_fetches(tmp_path: Path) -> None:
+    """The box fires; another program puts the files into folders, one of them late and alone."""
+    pytest.importorskip("rig.cameras.folder")
+    from PIL import Image
+
+    root = tmp_path / "tether"
+    for name in ("left", "right"):
+        (root / name).mkdir(parents=True)
+    path = tmp_path / "station.toml"
+    path.write_text(FOLDER_STATION.format(root=root))
+    picture = Image.effect_noise((64, 48), 80.0)
+    with open_station(read_station(path), locks=tmp_path / "locks") as rig:
+        assert rig.box is not None
+        wanted = ["left", "right"]
+
+        def fetch(report: object) -> None:  # noqa: ARG001
+            for name in wanted:
+                picture.save(root / name / f"{name}-{len(wanted)}.jpg")
+
+        rig.box.subscribe(fetch)
+        with rig.new_session(tmp_path / "session") as session:
+            whole = rig.capture(session, "both").record
+            assert whole.state == "complete"
+            assert {f.kind for f in whole.faults} == {"by-arrival"}
+            assert whole.verdict.level == "A" and whole.verdict.state == "unproven"
+            wanted.remove("right")
+            rig.station = replace(
+                rig.station, policy=replace(rig.station.policy, frame_deadline_s=0.3)
+            )
+            half = rig.capture(session, "one")
+            assert half.record.missing == {"right": [1]}
+            assert half.error is not None and "right" in str(half.error)
+            assert verify_session(session.folder).whole
