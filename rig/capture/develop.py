@@ -10,11 +10,11 @@ from rig.cameras.base import CameraCapabilities, ClockSample, TriggerKind
 from rig.capture.clocks import ClockFitter, DeviceClock, Instant, clock_jumped
 from rig.capture.collect import Collected
 from rig.capture.faults import Fault, FaultKind
+from rig.capture.firing import Firing
 from rig.capture.hands import CameraHand
 from rig.capture.instants import command_instants, edge_instants
 from rig.capture.looks import is_raw, look_faults
 from rig.capture.pairing import pair
-from rig.capture.run import Firing
 from rig.capture.shooting import CameraPart, Shooting
 from rig.capture.swaps import swapped
 from rig.capture.take import Pairing, Take

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from statistics import median
 
 from geometry.errors import InputError
@@ -93,3 +93,14 @@ def new_timings(station: Station, estimates: Mapping[str, LagEstimate]) -> dict[
 def _late_us(estimate: LagEstimate, middles: bool) -> float:
     """From the edge to the middle of the exposure, or to its start."""
     return estimate.lag_us + (estimate.exposure_us / 2.0 if middles else 0.0)
+
+
+def with_new_timings(station: Station, timings: Mapping[str, Timing]) -> Station:
+    """The station with these delays and lags."""
+    cameras = []
+    for camera in station.cameras:
+        found = timings.get(camera.name)
+        if found is not None:
+            camera = replace(camera, delay_us=found.delay_us, expected_lag_us=found.expected_lag_us)
+        cameras.append(camera)
+    return replace(station, cameras=tuple(cameras))

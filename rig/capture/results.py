@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from geometry.errors import DeviceError
+from geometry.errors import DeviceError, InputError
 from rig.cameras.base import CameraHealth
 from rig.capture.faults import Fault
-from rig.capture.lags import LagEstimate
+from rig.capture.lags import LagEstimate, estimate_lags, new_timings
 from rig.capture.records import CaptureRecord
 from rig.capture.verdict import Evidence
 from rig.station.delays import Timing
+from rig.station.spec import Station
 from rig.trigger.box import TriggerHealth
 
 
@@ -84,6 +85,18 @@ class SyncCheck:
     lags: Mapping[str, LagEstimate]
     timings: Mapping[str, Timing] | None
     why_not: str = ""
+
+
+def judged_lags(
+    station: Station, captures: Sequence[Evidence], faults: Sequence[Fault]
+) -> SyncCheck:
+    """The lags that several captures show, and the delays they ask for where all are known."""
+    lags = estimate_lags(captures)
+    try:
+        timings = new_timings(station, lags)
+    except InputError as error:
+        return SyncCheck(tuple(captures), tuple(faults), lags, None, error.problem)
+    return SyncCheck(tuple(captures), tuple(faults), lags, timings)
 
 
 @dataclass(frozen=True)

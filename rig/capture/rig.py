@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import contextlib
-import hashlib
-import secrets
 import threading
 import time
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -19,18 +16,20 @@ from rig.capture.clocks import ClockFitter, fit_clock
 from rig.capture.develop import develop
 from rig.capture.devices import DeviceMaker, StationDevices
 from rig.capture.faults import Fault
-from rig.capture.lags import estimate_lags, new_timings
+from rig.capture.firing import Fate, Order
+from rig.capture.lags import with_new_timings
+from rig.capture.naming import EitherToken, box_name
 from rig.capture.opening import OpenCameras
 from rig.capture.records import CaptureRecord
-from rig.capture.results import CaptureResult, DryRun, RigHealth, SelfTest, SyncCheck
+from rig.capture.results import CaptureResult, DryRun, RigHealth, SelfTest, SyncCheck, judged_lags
 from rig.capture.rigfacts import (
     focal_lengths_mm,
     picture_sizes,
     read_rig_design,
-    rig_sha256,
+    require_same_rig,
     session_plan,
 )
-from rig.capture.run import CaptureRun, Fate, Order
+from rig.capture.run import CaptureRun
 from rig.capture.selftest import self_test
 from rig.capture.sessionfolder import Session
 from rig.capture.shooting import Shooting
@@ -50,7 +49,6 @@ from solver.progress import (
     ignore_progress,
 )
 
-BOX_ID_LENGTH = 12
 NEVER = NeverCancelled()
 
 
@@ -155,12 +153,12 @@ class Rig:
         :class:`ConflictError` and :class:`CancelledError`; then nothing was committed.
         """
         partial = self.station.policy.allow_partial if allow_partial is None else allow_partial
-        self._check_burst(shots, interval_us)
+        check_burst(self.station, shots, interval_us)
         with self._busy_with(f"capture {capture_id}"):
             known = session.committed(capture_id)
             if known is not None:
                 return CaptureResult(known, session.folder, repeated=True)
-            self._require_same_rig(session)
+            require_same_rig(session.manifest, self.station, self._design)
             progress(Progress("checking", 0.0))
             session.require_space(self.station.policy.min_free_mb)
             stage = Stage(session, capture_id)
@@ -222,7 +220,7 @@ class Rig:
     ) -> DryRun:
         """Everything a capture does up to FIRE; raises what a capture would raise."""
         partial = self.station.policy.allow_partial if allow_partial is None else allow_partial
-        self._check_burst(shots, interval_us)
+        check_burst(self.station, shots, interval_us)
         with self._busy_with("a dry run"):
             began = time.monotonic()
             order = Order("dry-run", box_name("dry-run"), shots, interval_us, partial)
@@ -258,32 +256,27 @@ class Rig:
             faults: list[Fault] = []
             for k in range(captures):
                 progress(Progress(f"capture {k + 1} of {captures}", k / captures))
-                order = Order(f"sync-check-{k + 1}", box_name("sync-check"), 1, 0.0, False)
-                run = self._run(order, ignore_progress, cancel)
-                sizes = picture_sizes(self.station, self._design)
-                shooting = develop(self.station, run.run(), self._fit, sizes)
-                seen.append(gather(self.station, shooting, board or station_board(self.station)))
+                if k > 0:
+                    self._aborted.wait(pause_s)
+                shooting, evidence = self._look_once(k + 1, board, cancel)
+                seen.append(evidence)
                 faults += shooting.all_faults
-                if k + 1 < captures:
-                    time.sleep(pause_s)
-        lags = estimate_lags(seen)
-        try:
-            timings, why_not = new_timings(self.station, lags), ""
-        except InputError as error:
-            return SyncCheck(tuple(seen), tuple(faults), lags, None, error.problem)
-        return SyncCheck(tuple(seen), tuple(faults), lags, timings, why_not)
+            progress(Progress("done", 1.0))
+        return judged_lags(self.station, seen, faults)
+
+    def _look_once(
+        self, number: int, board: Board | None, cancel: CancelToken
+    ) -> tuple[Shooting, Evidence]:
+        """One capture of which nothing is filed."""
+        order = Order(f"sync-check-{number}", box_name("sync-check"))
+        firing = self._run(order, ignore_progress, cancel).run()
+        sizes = picture_sizes(self.station, self._design)
+        shooting = develop(self.station, firing, self._fit, sizes)
+        return shooting, gather(self.station, shooting, board or station_board(self.station))
 
     def adopt(self, timings: Mapping[str, Timing]) -> None:
         """Work with new delays from now on; the station file is written by ``write_timings``."""
-        cameras = []
-        for camera in self.station.cameras:
-            found = timings.get(camera.name)
-            cameras.append(
-                camera
-                if found is None
-                else replace(camera, delay_us=found.delay_us, expected_lag_us=found.expected_lag_us)
-            )
-        self.station = replace(self.station, cameras=tuple(cameras))
+        self.station = with_new_timings(self.station, timings)
 
     def _run(
         self,
@@ -299,32 +292,10 @@ class Rig:
             hands=self._cameras.hands(self.station),
             order=order,
             progress=progress,
-            cancel=_Either(cancel, self._aborted),
+            cancel=EitherToken(cancel, self._aborted),
             may_fire=lambda: None if stage is None else stage.may_fire(order.box_capture),
             unopened=dict(self._cameras.problems),
         )
-
-    def _check_burst(self, shots: int, interval_us: float) -> None:
-        check_burst(shots, interval_us)
-        for camera in self.station.cameras if shots > 1 else ():
-            latest = camera.expected_lag_us + camera.lag_tolerance_us
-            if latest - max(0.0, camera.expected_lag_us - camera.lag_tolerance_us) >= interval_us:
-                raise InputError(
-                    "interval",
-                    f"shots {interval_us / 1e3:g} ms apart cannot be told from each other by "
-                    f"camera {camera.name}, whose lag is known to "
-                    f"+- {camera.lag_tolerance_us / 1e3:g} ms",
-                    "give a longer interval, or a smaller lag_tolerance_us where it is true",
-                )
-
-    def _require_same_rig(self, session: Session) -> None:
-        if session.manifest.rig_sha256 != rig_sha256(self.station, self._design):
-            raise ConflictError(
-                "session-other-rig",
-                f"the session {session.folder} was begun with another rig "
-                f"({session.manifest.station})",
-                "begin a new session",
-            )
 
     @contextlib.contextmanager
     def _busy_with(self, what: str) -> Iterator[None]:
@@ -339,23 +310,3 @@ class Rig:
         finally:
             self._doing = None
             self._turn.release()
-
-
-class _Either:
-    """A cancel token that is set when one of two is."""
-
-    def __init__(self, one: CancelToken, other: CancelToken) -> None:
-        self._one, self._other = one, other
-
-    def is_set(self) -> bool:
-        return self._one.is_set() or self._other.is_set()
-
-
-def box_name(*parts: str) -> str:
-    """A capture's name at the box: 12 characters that were never used before.
-
-    The client's own id may be longer, and may be tried again after a refusal; the box must see
-    another name each time, because it fires each name only once.
-    """
-    text = "/".join((*parts, secrets.token_hex(8)))
-    return hashlib.sha256(text.encode()).hexdigest()[:BOX_ID_LENGTH]

@@ -8,11 +8,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from geometry.camera import RigCamera
-from geometry.errors import InputError
+from geometry.errors import ConflictError, InputError
 from rig.cameras.base import CameraInfo
 from rig.capture import places
 from rig.capture.colmap import rig_config
 from rig.capture.jsonfiles import json_bytes, plain
+from rig.capture.records import SessionFile
 from rig.capture.sessionfolder import SessionPlan
 from rig.capture.storage import sha256
 from rig.designfile import placed_camera, read_design
@@ -104,6 +105,16 @@ def rig_sha256(station: Station, design: RigDesign) -> str:
     """
     devices = [[camera.name, camera.backend, camera.id] for camera in station.cameras]
     return sha256(json.dumps([devices, sha256(design.data)]).encode())
+
+
+def require_same_rig(session: SessionFile, station: Station, design: RigDesign) -> None:
+    """Raise :class:`ConflictError` for a session that was begun with another rig."""
+    if session.rig_sha256 != rig_sha256(station, design):
+        raise ConflictError(
+            "session-other-rig",
+            f"the session was begun with another rig ({session.station})",
+            "begin a new session",
+        )
 
 
 def _rig_document(

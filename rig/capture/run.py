@@ -8,13 +8,13 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
-from enum import StrEnum
 from functools import partial
 
 from geometry.errors import CancelledError, DeviceError, InterlockError, RigwrightError
-from rig.cameras.base import ArmSpec, CameraDevice, CameraSettings, ClockSample
+from rig.cameras.base import ArmSpec, CameraDevice, CameraSettings
 from rig.capture.collect import Collected, Want, collect, read_clock
 from rig.capture.faults import Fault, FaultKind
+from rig.capture.firing import FATES, Fate, Firing, Order, Ready
 from rig.capture.hands import CameraHand, do_all, outcomes
 from rig.capture.instants import Bracket
 from rig.station.pulses import arm_request
@@ -25,58 +25,6 @@ from solver.progress import CancelToken, Progress, ProgressCallback
 WATCH_S = 0.05
 BOX_MARGIN_S = 2.0
 """What a box may take beyond its pulses to say what became of them."""
-
-
-class Fate(StrEnum):
-    """What is known of a capture's FIRE."""
-
-    NOT_FIRED = "not-fired"
-    UNKNOWN = "unknown"
-    FIRED = "fired"
-
-
-FATES = {
-    Outcome.FIRED: Fate.FIRED,
-    Outcome.PARTIAL: Fate.FIRED,
-    Outcome.NOT_FIRED: Fate.NOT_FIRED,
-    Outcome.UNKNOWN: Fate.UNKNOWN,
-}
-
-
-@dataclass(frozen=True)
-class Order:
-    """One capture as it was asked for. ``box_capture`` is its name at the box."""
-
-    capture_id: str
-    box_capture: str
-    shots: int = 1
-    interval_us: float = 0.0
-    allow_partial: bool = False
-
-
-@dataclass(frozen=True, eq=False)
-class Ready:
-    """A camera that is armed, and what it said meanwhile."""
-
-    settings: CameraSettings
-    armed_host_ns: int
-    clock_samples: tuple[ClockSample, ...]
-
-
-@dataclass(frozen=True, eq=False)
-class Firing:
-    """What the devices gave. ``fired_at`` is wall-clock time of ``fired.middle_ns``."""
-
-    order: Order
-    request: ArmRequest | None
-    report: FireReport | None
-    fired: Bracket
-    fired_at: datetime
-    hands: tuple[CameraHand, ...]
-    ready: dict[str, Ready]
-    collected: dict[str, Collected]
-    absent: tuple[str, ...] = ()
-    faults: tuple[Fault, ...] = ()
 
 
 @dataclass

@@ -37,7 +37,7 @@ def arm_request(
     interval_us: float = 0.0,
 ) -> ArmRequest:
     """The whole request for one capture. :class:`InputError` for a burst that cannot be."""
-    check_burst(shots, interval_us)
+    check_burst(station, shots, interval_us)
     return ArmRequest(
         capture_id=box_capture,
         pulses=station_pulses(station, cameras),
@@ -47,11 +47,23 @@ def arm_request(
     )
 
 
-def check_burst(shots: int, interval_us: float) -> None:
-    """Raise for a number of shots and an interval that make no burst."""
+def check_burst(station: Station, shots: int, interval_us: float) -> None:
+    """Raise for shots and an interval that make no burst, or one that nobody could take apart."""
     if not 1 <= shots <= LARGEST_SHOTS:
         raise InputError(
             "shots", f"{shots} shots make no capture", f"give 1 to {LARGEST_SHOTS} shots"
         )
-    if shots > 1 and not interval_us > 0.0:
+    if shots == 1:
+        return
+    if not interval_us > 0.0:
         raise InputError("interval", "a burst needs an interval", "give the time from shot to shot")
+    for camera in station.cameras:
+        latest = camera.expected_lag_us + camera.lag_tolerance_us
+        earliest = max(0.0, camera.expected_lag_us - camera.lag_tolerance_us)
+        if latest - earliest >= interval_us:
+            raise InputError(
+                "interval",
+                f"shots {interval_us / 1e3:g} ms apart cannot be told from each other by camera "
+                f"{camera.name}, whose lag is known to +- {camera.lag_tolerance_us / 1e3:g} ms",
+                "give a longer interval, or a smaller lag_tolerance_us where it is true",
+            )
