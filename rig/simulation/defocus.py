@@ -10,12 +10,14 @@ own blur radius, which real lenses do not do.
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.arrays import Floats
 from geometry.camera import RigCamera
 from geometry.optics import blur_disk_mm
 from rig.simulation.imaging import SharpImage, fill_backdrop
@@ -30,6 +32,11 @@ _FINEST_STEP_PX = 0.7
 _GROWTH = 1.3
 _LARGEST_BLUR_PX = 250.0
 _BAND_ROWS = 64
+_SMALL_DISK_PX = 1.8
+_LEAST_DEVIATION_PX = 0.05
+_SMALL_DEVIATION_PX = 0.7
+_CELLS = 16
+"""Cells each way into which a pixel is cut to find how much of it a disk covers."""
 
 
 def blur_px(depth_mm: Singles, rig_camera: RigCamera, f_number: float) -> Singles:
@@ -90,6 +97,22 @@ def _spread(image: SharpImage, blur: Singles, view: View, table: Singles, pad: i
     return np.asarray((total[..., :-1] + rest * backdrop) / (total[..., -1:] + rest))
 
 
+def softened(light: Singles, deviation_px: float) -> Singles:
+    """The light (H, W, C) after what even a perfectly focused lens blurs, a Gaussian."""
+    if deviation_px < _LEAST_DEVIATION_PX:
+        return light
+    variance = deviation_px**2
+    if deviation_px < _SMALL_DEVIATION_PX:
+        # A Gaussian narrower than a pixel cannot be sampled; three weights can be as wide as it.
+        side = np.array([variance / 2.0, 1.0 - variance, variance / 2.0])
+    else:
+        place = np.arange(-int(5.0 * deviation_px), int(5.0 * deviation_px) + 1)
+        side = np.exp(-0.5 * place**2 / variance)
+        side /= side.sum()
+    soft = cv2.sepFilter2D(light, -1, side, side, borderType=cv2.BORDER_REPLICATE)
+    return np.asarray(soft, dtype=np.float32).reshape(light.shape)
+
+
 def _box(where: NDArray[np.bool_], pad: int) -> tuple[slice, slice]:
     """The rows and columns that hold all true pixels, and ``pad`` more."""
     rows, columns = np.flatnonzero(where.any(axis=1)), np.flatnonzero(where.any(axis=0))
@@ -134,20 +157,37 @@ def _add_layer(total: Singles, own: Singles, share: Singles, diameter_px: float)
     total[box] += layer.reshape(total[box].shape)
 
 
+@lru_cache(maxsize=64)
 def disk_kernel(diameter_px: float) -> Singles:
     """Weights (K, K), K odd, of a blur disk, with the disk's own second moments d^2/16.
 
-    A disk spread over square pixels is wider by the pixel's own 1/12, so a slightly smaller one
-    is taken; disks too small for that become three weights each way.
+    A disk spread over square pixels is wider by about the pixel's own 1/12, so a slightly smaller
+    one is taken; disks too small for that become three weights each way.
     """
     variance = diameter_px**2 / 16.0
-    if diameter_px < 1.8:
+    if diameter_px < _SMALL_DISK_PX:
         side = np.array([variance / 2.0, 1.0 - variance, variance / 2.0])
         return np.outer(side, side).astype(np.float32)
-    radius = 0.5 * np.sqrt(diameter_px**2 - 4.0 / 3.0)
-    half = int(np.ceil(radius + 0.5))
-    fine = 16
-    place = (np.arange((2 * half + 1) * fine) + 0.5) / fine - half - 0.5
-    inside = np.hypot(place[:, None], place) <= radius
-    kernel = inside.reshape(2 * half + 1, fine, 2 * half + 1, fine).mean(axis=(1, 3))
-    return np.asarray(kernel / kernel.sum(), dtype=np.float32)
+    low, high = 0.25 * diameter_px, 0.55 * diameter_px
+    for _ in range(12):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if _variance(_disk(middle)) < variance else (low, middle)
+    kernel = _disk(high)
+    # What the fineness of the cells leaves over goes to the middle.
+    kernel *= variance / _variance(kernel)
+    kernel[len(kernel) // 2, len(kernel) // 2] += 1.0 - kernel.sum()
+    return kernel.astype(np.float32)
+
+
+def _disk(radius_px: float) -> Floats:
+    """Share of each pixel that a disk covers, (K, K), of sum 1."""
+    half = int(np.ceil(radius_px - 0.5))
+    place = (np.arange((2 * half + 1) * _CELLS) + 0.5) / _CELLS - half - 0.5
+    inside = np.hypot(place[:, None], place) <= radius_px
+    kernel = inside.reshape(2 * half + 1, _CELLS, 2 * half + 1, _CELLS).mean(axis=(1, 3))
+    return np.asarray(kernel / kernel.sum())
+
+
+def _variance(kernel: Floats) -> float:
+    place = np.arange(len(kernel)) - len(kernel) // 2
+    return float((kernel.sum(axis=0) * place**2).sum())

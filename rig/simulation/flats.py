@@ -18,7 +18,9 @@ from rig.simulation.settings import PlaceSettings, TargetSettings
 
 Singles = NDArray[np.float32]
 
-_PX_PER_CELL = 24
+_PX_PER_CELL = 8
+"""Of a coded face: so that its borders, and the quarters of a ChArUco square, are whole pixels."""
+
 _BORDER_SHARE = 0.125
 _BOARD_PX_PER_MM = 12.0
 _BACK_ALBEDO = 0.4
@@ -31,7 +33,8 @@ class Flat:
 
     ``centre_rig_mm`` (3,), unit vectors ``right_rig``, ``down_rig`` and ``facing_rig`` (3,),
     ``size_mm`` width and height; ``albedo`` the face and smaller copies of it, linear, (H, W) or
-    (H, W, 3); ``glow`` its own radiance (H, W) or None.
+    (H, W, 3); ``glow`` its own radiance (H, W) or None. The pixels of a ``blocky`` face are what
+    is printed, so they have sharp edges; others are smooth between their pixels.
     """
 
     centre_rig_mm: Floats
@@ -41,10 +44,16 @@ class Flat:
     size_mm: tuple[float, float]
     albedo: tuple[Singles, ...]
     glow: tuple[Singles, ...] | None = None
+    blocky: bool = False
 
 
 def placed(
-    place: PlaceSettings, size_mm: tuple[float, float], albedo: Singles, glow: Singles | None = None
+    place: PlaceSettings,
+    size_mm: tuple[float, float],
+    albedo: Singles,
+    glow: Singles | None = None,
+    *,
+    blocky: bool = False,
 ) -> Flat:
     """A flat thing at its place; ``albedo`` is linear."""
     facing = np.array(place.facing_rig) / np.linalg.norm(place.facing_rig)
@@ -61,6 +70,7 @@ def placed(
         size_mm,
         pyramid(albedo),
         None if glow is None else pyramid(glow),
+        blocky,
     )
 
 
@@ -79,7 +89,7 @@ def target(settings: TargetSettings) -> Flat:
     # White paper and black ink are neither quite.
     albedo = np.float32(0.04) + np.float32(0.82) * (face.astype(np.float32) / 255.0)
     size = (face.shape[1] / px_per_mm, face.shape[0] / px_per_mm)
-    return placed(settings.place, size, albedo)
+    return placed(settings.place, size, albedo, blocky=True)
 
 
 def _coded(settings: TargetSettings) -> tuple[NDArray[np.uint8], float]:
@@ -98,9 +108,9 @@ def _coded(settings: TargetSettings) -> tuple[NDArray[np.uint8], float]:
         face = cv2.aruco.generateImageMarker(dictionary, settings.marker_id, side)
         return np.asarray(face, dtype=np.uint8), side / settings.size_mm
     # Three quarters of a square is a marker; cells and quarters both divide the side.
-    side = 4 * cells * 4
     board = charuco_board(settings)
     across, down = settings.squares
+    side = cells * _PX_PER_CELL
     face = board.generateImage((across * side, down * side))
     return np.asarray(face, dtype=np.uint8), side / settings.size_mm
 
@@ -196,7 +206,8 @@ class FlatView:
         half_x, half_y = (np.float32(0.5 * v) for v in self._flat.size_mm)
         x = (across + half_x) * scale_x - np.float32(0.5)
         y = (along + half_y) * scale_y - np.float32(0.5)
-        return np.asarray(sampled(picture, x, y), dtype=np.float32)
+        sharp = self._flat.blocky and self._level == 0
+        return np.asarray(sampled(picture, x, y, sharp=sharp), dtype=np.float32)
 
 
 def _dot(rays: Singles, direction: Floats) -> Singles:

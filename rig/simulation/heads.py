@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,7 @@ _BAND_ROWS = 256
 _SHRINK = cv2.INTER_AREA
 
 
+@lru_cache(maxsize=2)
 def head_mesh(settings: HeadSettings) -> TexturedMesh:
     """The mesh of the head in the rig frame, not yet rounded.
 

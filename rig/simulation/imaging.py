@@ -1,7 +1,7 @@
 """From rays to the light on the sensor, before noise: one ray per pixel, more where it matters.
 
 Pixels on the border of two things, at a jump of depth, or in a part of a flat thing that is not
-even get 8 rays spread over their area, 16 where a flat thing is near, whose edges are measured.
+even get 8 rays spread over their area, 32 where a flat thing is near, whose edges are measured.
 All other pixels show surfaces that change little within a pixel (grain finer than a pixel is
 faded out), and one ray in the middle is enough.
 """
@@ -21,7 +21,7 @@ from rig.simulation.tracing import BACKDROP, FIRST_FLAT, View
 Singles = NDArray[np.float32]
 
 _TILE_RAYS = 65_536
-_RAYS, _RAYS_OF_FLATS = 8, 16
+_RAYS, _RAYS_OF_FLATS = 8, 32
 _DEPTH_STEP_PX = 20.0
 """A step in depth between neighbours of more than so many pixels' width is an edge."""
 

@@ -16,8 +16,11 @@ Picture = NDArray[np.uint8] | NDArray[np.float32]
 _ROW = 4096
 
 
-def sampled(picture: Picture, x_px: Singles, y_px: Singles) -> Picture:
-    """Values (N,) or (N, C) of a picture at N places, bilinear, the border repeated outside."""
+def sampled(picture: Picture, x_px: Singles, y_px: Singles, *, sharp: bool = False) -> Picture:
+    """Values (N,) or (N, C) of a picture at N places, the border repeated outside.
+
+    Bilinear between the pixels, or, if ``sharp``, those of the pixel that a place is in.
+    """
     count = len(x_px)
     if count == 0:
         return np.zeros((0, *picture.shape[2:]), dtype=picture.dtype)
@@ -30,7 +33,7 @@ def sampled(picture: Picture, x_px: Singles, y_px: Singles) -> Picture:
         picture,
         maps[0].reshape(rows, width),
         maps[1].reshape(rows, width),
-        cv2.INTER_LINEAR,
+        cv2.INTER_NEAREST if sharp else cv2.INTER_LINEAR,
         borderMode=cv2.BORDER_REPLICATE,
     )
     flat: Picture = values.reshape(rows * width, *picture.shape[2:])[:count]

@@ -242,7 +242,8 @@ class SensorSettings:
 
     The wells (``full_well_e`` electrons) are full at radiance 1, ``reference_exposure_us`` and
     ``reference_f_number``, at gain 0 dB; ``read_noise_e`` is rms. ``vignetting`` 1 is the natural
-    fall of light (cos^4), 0 none. ``depth_of_field`` False makes everything sharp.
+    fall of light (cos^4), 0 none. ``depth_of_field`` False makes everything sharp but for
+    ``lens_blur_px``, the standard deviation of what lens and diffraction blur even in focus.
     """
 
     full_well_e: float = 10_000.0
@@ -251,11 +252,13 @@ class SensorSettings:
     reference_f_number: float | None = None
     vignetting: float = 1.0
     depth_of_field: bool = True
+    lens_blur_px: float = 0.5
 
     def __post_init__(self) -> None:
         require_range("full_well_e", self.full_well_e, 100.0, 1e7)
         require_range("read_noise_e", self.read_noise_e, 0.0, 1e4)
         require_range("reference_exposure_us", self.reference_exposure_us, 1.0, 1e8)
+        require_range("lens_blur_px", self.lens_blur_px, 0.0, 20.0)
         require_range("vignetting", self.vignetting, 0.0, 4.0)
         if self.reference_f_number is not None:
             require_range("reference_f_number", self.reference_f_number, 0.5, 128.0)

@@ -12,7 +12,7 @@ from geometry.camera import RigCamera
 from geometry.errors import NotFoundError
 from rig.cameras.base import Image
 from rig.capture.graytime import lit_shares
-from rig.simulation.defocus import defocused
+from rig.simulation.defocus import defocused, softened
 from rig.simulation.flats import Flat, FlatView, target, timing_board
 from rig.simulation.heads import head_mesh
 from rig.simulation.imaging import sharp_image
@@ -117,7 +117,9 @@ class Studio:
             total = light if total is None else total + light
         if total is None:
             raise AssertionError("an exposure has at least one sample")
-        return total if samples == 1 else total / np.float32(samples)
+        if samples > 1:
+            total /= np.float32(samples)
+        return softened(total, self.sensor.lens_blur_px)
 
     def _view(self, rig_camera: RigCamera, shot: Shot, middle_s: float) -> View:
         placement = placement_at(self.scene.motion, middle_s)
