@@ -367,7 +367,7 @@ class TestOnTheCommandLine:
         done = self.run("demo", "--out", tmp_path / "demo", "--json")
         assert done.returncode == 0, done.stderr
         names = {path.name for path in (tmp_path / "demo").iterdir()}
-        assert names == {*FILE_NAMES, "head.ply", "face.toml"}
+        assert names == {*FILE_NAMES, "head.ply", "face.toml", "station.toml"}
         again = self.run(
             "evaluate",
             tmp_path / "demo/design.json",

@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from geometry.errors import InputError, TooLargeError
+from rig.station.examples import example_station_text
 from rig.station.pulses import arm_request, station_pulses
 from rig.station.spec import ImageFormat, Interlock, Station
 from rig.station.stationfile import parse_station, read_station, station_from_mapping
@@ -210,3 +211,7 @@ def test_whatever_is_given_ends_in_a_station_or_one_line(change: dict[str, Any])
         assert "\n" not in str(error)
     else:
         assert isinstance(station, Station)
+
+
+def test_the_example_is_the_one_of_the_program() -> None:
+    assert EXAMPLE.read_text(encoding="utf-8") == example_station_text()
