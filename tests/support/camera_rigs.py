@@ -34,7 +34,7 @@ from rig.cameras.base import (
     TriggerKind,
 )
 from rig.cameras.registry import make_backend
-from rig.cameras.remote import RemoteCamera
+from rig.cameras.remotecamera import RemoteCamera
 
 FAKE_GV = "arv-fake-gv-camera-0.8"
 LIFE_S = 240
@@ -135,7 +135,9 @@ def aravis_rig(place: Path, serial: str = "RW01", **options: object) -> CameraRi
     del place
     fake = FakeGigE(serial)
     try:
-        backend = make_backend("aravis", {"trigger": "software", **options})
+        # Known addresses save the second that discovery takes; it has tests of its own.
+        given = {"trigger": "software", "addresses": {serial: "127.0.0.1"}, **options}
+        backend = make_backend("aravis", given)
     except BaseException:
         fake.stop()
         raise

@@ -24,7 +24,7 @@ from rig.cameras.base import (
     TriggerKind,
 )
 from rig.cameras.registry import make_backend
-from rig.cameras.remote import RemoteCamera
+from rig.cameras.remotecamera import RemoteCamera
 
 pytestmark = pytest.mark.needs_aravis
 

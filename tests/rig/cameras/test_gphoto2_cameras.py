@@ -15,7 +15,7 @@ from camera_rigs import CameraRig, gphoto2_rig
 
 from geometry.errors import DeviceError, InputError
 from rig.cameras.base import ArmSpec, CameraSettings, TriggerKind
-from rig.cameras.remote import RemoteCamera
+from rig.cameras.remotecamera import RemoteCamera
 
 pytestmark = pytest.mark.needs_gphoto2
 
