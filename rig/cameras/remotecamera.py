@@ -180,14 +180,14 @@ class RemoteCamera:
     def _configure(self, settings: CameraSettings) -> CameraSettings:
         self._armed = False
         real = CameraSettings(**self._ask("configure", {"settings": asdict(settings)}))
-        wanted = {name: value for name, value in asdict(settings).items() if value is not None}
-        self._settings = CameraSettings(**{**asdict(self._settings), **wanted})
         if real.pixel_format and not pixels.understood(real.pixel_format):
             raise InputError(
                 "camera-setting",
                 f"pixel_format: {real.pixel_format} of camera {self._id} cannot be read",
                 "choose a Mono, Bayer or RGB format of up to 16 bits",
             )
+        wanted = {name: value for name, value in asdict(settings).items() if value is not None}
+        self._settings = CameraSettings(**{**asdict(self._settings), **wanted})
         return real
 
     def arm(self, spec: ArmSpec) -> None:
@@ -221,7 +221,9 @@ class RemoteCamera:
         link = self._link
         if link is not None:
             link.tell("collect")
-        return self._inbox.wait(count, timeout_s, lambda: bool(self._problem or self._note))
+        return self._inbox.wait(
+            count, timeout_s, lambda: bool(self._closed or self._problem or self._note)
+        )
 
     def disarm(self) -> None:
         """Stop waiting for triggers; nothing to do for a camera that is gone."""

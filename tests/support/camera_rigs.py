@@ -174,7 +174,7 @@ def genicam_rig(place: Path) -> CameraRig:
     return CameraRig(
         "genicam",
         backend,
-        backend.discover()[0].id,
+        "0",  # the serial number of the red one
         shoot=lambda _: None,
         unplug=crash,
         settings=CameraSettings(pixel_format="Mono8"),
@@ -191,11 +191,12 @@ def gphoto2_rig(place: Path, **options: object) -> CameraRig:
     return CameraRig(
         "gphoto2",
         backend,
-        backend.discover()[0].id,
+        "0.1",  # what the virtual body says
         shoot=fire,
         unplug=crash,
         settings=CameraSettings(exposure_us=10_000.0, f_number=8.0),
         tolerance=0.12,  # a sixth of a stop
+        frame_s=0.3,
         close=backend.close,
     )
 
@@ -206,7 +207,7 @@ def files_rig(place: Path) -> CameraRig:
         assert cv2.imwrite(str(place / f"f_{k:04d}.png"), np.full((30, 40, 3), k, np.uint8))
     sources = {"left": str(place / "f_%04d.png")}
     backend = make_backend("opencv", {"sources": sources, "command_deadline_s": 1.0})
-    return CameraRig("files", backend, "left", fire, unplug=crash, close=backend.close)
+    return CameraRig("files", backend, "left", fire, unplug=crash, frame_s=0.2, close=backend.close)
 
 
 class Webcam:
@@ -312,6 +313,7 @@ def folder_rig(place: Path) -> CameraRig:
         shoot,
         unplug=lambda _: (root / "cam01").rename(place / "away") and None,
         plug=lambda: (place / "away").rename(root / "cam01") and None,
+        frame_s=0.1,
         close=backend.close,
     )
 
