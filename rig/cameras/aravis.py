@@ -18,7 +18,8 @@ from pydantic import Field
 
 from rig.cameras.base import CameraInfo
 from rig.cameras.options import missing, read_options
-from rig.cameras.remote import RemoteBackend, WorkerSpec
+from rig.cameras.remote import RemoteBackend
+from rig.cameras.remotecamera import WorkerSpec
 from rig.strict import StrictModel
 
 INSTALL = "apt install gir1.2-aravis-0.8 python3-gi"

@@ -196,6 +196,7 @@ class FolderCamera:
         """The files that came since :meth:`arm`, whole ones only."""
         deadline = time.monotonic() + timeout_s
         while self._armed:
+            began = time.monotonic()
             try:
                 self._collect()
             except OSError:  # the folder went; health and the next arm say so
@@ -203,7 +204,8 @@ class FolderCamera:
             left = deadline - time.monotonic()
             if len(self._frames) >= count or left <= 0:
                 break
-            time.sleep(min(POLL_S, left))
+            # A large tree on a slow share must not be read without a pause.
+            time.sleep(min(max(POLL_S, time.monotonic() - began), left))
         return tuple(self._frames)
 
     def _collect(self) -> None:

@@ -12,7 +12,8 @@ from pydantic import Field
 
 from geometry.errors import InputError
 from rig.cameras.options import read_options, require
-from rig.cameras.remote import RemoteBackend, WorkerSpec
+from rig.cameras.remote import RemoteBackend
+from rig.cameras.remotecamera import WorkerSpec
 from rig.strict import StrictModel
 
 INSTALL = "pip install 'rigwright[genicam]'"

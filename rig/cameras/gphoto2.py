@@ -13,7 +13,8 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from rig.cameras.options import read_options, require
-from rig.cameras.remote import RemoteBackend, WorkerSpec
+from rig.cameras.remote import RemoteBackend
+from rig.cameras.remotecamera import WorkerSpec
 from rig.strict import StrictModel
 
 INSTALL = "pip install 'rigwright[gphoto2]'"

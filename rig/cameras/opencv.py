@@ -17,7 +17,8 @@ from pydantic import Field
 from geometry.errors import NotFoundError
 from rig.cameras.base import CameraInfo
 from rig.cameras.options import read_options
-from rig.cameras.remote import RemoteBackend, RemoteCamera, WorkerSpec
+from rig.cameras.remote import RemoteBackend
+from rig.cameras.remotecamera import RemoteCamera, WorkerSpec
 from rig.strict import StrictModel
 
 BY_ID = "/dev/v4l/by-id"

@@ -34,7 +34,7 @@ from rig.cameras.base import (
     TriggerKind,
 )
 from rig.cameras.registry import make_backend
-from rig.cameras.remote import RemoteCamera
+from rig.cameras.remotecamera import RemoteCamera
 
 FAKE_GV = "arv-fake-gv-camera-0.8"
 LIFE_S = 240
@@ -135,7 +135,9 @@ def aravis_rig(place: Path, serial: str = "RW01", **options: object) -> CameraRi
     del place
     fake = FakeGigE(serial)
     try:
-        backend = make_backend("aravis", {"trigger": "software", **options})
+        # Known addresses save the second that discovery takes; it has tests of its own.
+        given = {"trigger": "software", "addresses": {serial: "127.0.0.1"}, **options}
+        backend = make_backend("aravis", given)
     except BaseException:
         fake.stop()
         raise
@@ -172,7 +174,7 @@ def genicam_rig(place: Path) -> CameraRig:
     return CameraRig(
         "genicam",
         backend,
-        backend.discover()[0].id,
+        "0",  # the serial number of the red one
         shoot=lambda _: None,
         unplug=crash,
         settings=CameraSettings(pixel_format="Mono8"),
@@ -189,11 +191,12 @@ def gphoto2_rig(place: Path, **options: object) -> CameraRig:
     return CameraRig(
         "gphoto2",
         backend,
-        backend.discover()[0].id,
+        "0.1",  # what the virtual body says
         shoot=fire,
         unplug=crash,
         settings=CameraSettings(exposure_us=10_000.0, f_number=8.0),
         tolerance=0.12,  # a sixth of a stop
+        frame_s=0.3,
         close=backend.close,
     )
 
@@ -204,7 +207,7 @@ def files_rig(place: Path) -> CameraRig:
         assert cv2.imwrite(str(place / f"f_{k:04d}.png"), np.full((30, 40, 3), k, np.uint8))
     sources = {"left": str(place / "f_%04d.png")}
     backend = make_backend("opencv", {"sources": sources, "command_deadline_s": 1.0})
-    return CameraRig("files", backend, "left", fire, unplug=crash, close=backend.close)
+    return CameraRig("files", backend, "left", fire, unplug=crash, frame_s=0.2, close=backend.close)
 
 
 class Webcam:
@@ -310,6 +313,7 @@ def folder_rig(place: Path) -> CameraRig:
         shoot,
         unplug=lambda _: (root / "cam01").rename(place / "away") and None,
         plug=lambda: (place / "away").rename(root / "cam01") and None,
+        frame_s=0.1,
         close=backend.close,
     )
 

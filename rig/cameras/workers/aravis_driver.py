@@ -5,13 +5,13 @@ from __future__ import annotations
 import contextlib
 import ipaddress
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Optional
 
 import gi
 
-from geometry.errors import DeviceError
 from rig.cameras.workers import features
+from rig.cameras.workers.aravis_nodes import AravisNodes, gone, library, pfnc
 from rig.cameras.workers.serve import Picture
 
 gi.require_version("Aravis", "0.8")
@@ -29,15 +29,6 @@ COUNTERS = (
     "n_missing_frames",
     "n_missing_packets",
     "n_resent_packets",
-)
-GONE_WORDS = (
-    "timeout",
-    "access",
-    "not-connected",
-    "not connected",
-    "lost",
-    "no device",
-    "no such device",
 )
 
 
@@ -76,76 +67,6 @@ def _at(address: str, camera_id: str) -> tuple[Any, dict[str, str]] | None:
     return camera, info
 
 
-def _gone(why: str) -> DeviceError:
-    return DeviceError(
-        "camera-gone",
-        f"the camera does not answer ({why})",
-        "check its power and cable; one that another program holds does not answer either",
-    )
-
-
-@contextlib.contextmanager
-def _library() -> Iterator[None]:
-    """Errors of the library as ours."""
-    try:
-        yield
-    except GLib.Error as error:
-        if any(word in error.message.lower() for word in GONE_WORDS):
-            raise _gone(error.message) from None
-        raise DeviceError(
-            "camera-error",
-            f"the camera refused: {error.message}",
-            "check its settings, or open it again",
-        ) from None
-
-
-class AravisNodes:
-    """Features through Aravis."""
-
-    def __init__(self, camera: Any) -> None:  # noqa: ANN401  the library has no types
-        self._camera = camera
-
-    def has(self, name: str) -> bool:
-        """Whether it is there and can be used now."""
-        return bool(self._camera.is_feature_available(name))
-
-    def get(self, name: str) -> features.Value:
-        """Its value."""
-        node = self._camera.get_device().get_feature(name)
-        if isinstance(node, Aravis.GcFloat):
-            return float(self._camera.get_float(name))
-        if isinstance(node, Aravis.GcEnumeration) or not isinstance(node, Aravis.GcInteger):
-            return str(self._camera.get_string(name))
-        return int(self._camera.get_integer(name))
-
-    def set(self, name: str, value: features.Value) -> None:
-        """Set it."""
-        node = self._camera.get_device().get_feature(name)
-        if isinstance(node, Aravis.GcBoolean):
-            self._camera.set_boolean(name, bool(value))
-        elif isinstance(value, str):
-            self._camera.set_string(name, value)
-        elif isinstance(node, Aravis.GcFloat):
-            self._camera.set_float(name, float(value))
-        elif isinstance(node, Aravis.GcEnumeration):
-            self._camera.set_string(name, "On" if value else "Off")
-        else:
-            self._camera.set_integer(name, round(value))
-
-    def run(self, name: str) -> None:
-        """Execute a command."""
-        self._camera.execute_command(name)
-
-    def bounds(self, name: str) -> Optional[tuple[float, float]]:  # noqa: UP045
-        """Least and greatest value of a number."""
-        bounds = self._camera.get_float_bounds(name)
-        return float(bounds.min), float(bounds.max)
-
-    def choices(self, name: str) -> Sequence[str]:
-        """Values of an enumeration."""
-        return list(self._camera.dup_available_enumerations_as_strings(name))
-
-
 class AravisDriver:
     """One camera; :class:`rig.cameras.workers.serve.Driver` says what each method does."""
 
@@ -170,7 +91,7 @@ class AravisDriver:
 
     def open(self, camera_id: str) -> Mapping[str, Any]:
         """Take control of the camera with this serial number."""
-        with _library():
+        with library():
             self._camera, info = self._reach(camera_id)
             self._nodes = AravisNodes(self._camera)
             self._camera.get_device().connect("control-lost", self._on_lost)
@@ -186,7 +107,7 @@ class AravisDriver:
             return near
         found = [one for one in _found() if one["id"] == camera_id]
         if not found:
-            raise _gone(f"none on the network or USB has the serial number {camera_id}")
+            raise gone(f"none on the network or USB has the serial number {camera_id}")
         return Aravis.Camera.new(found[0]["key"]), found[0]
 
     def _set_up(self) -> None:
@@ -226,18 +147,18 @@ class AravisDriver:
 
     def configure(self, settings: Mapping[str, Any]) -> Mapping[str, Any]:
         """Set what is not None; all settings as they are now."""
-        with _library():
+        with library():
             self._stop()
             return features.configure(self._nodes, settings)
 
     def arm(self, shots: int) -> int:
         """Start streaming with an empty queue; frames of before are counted and dropped."""
         self._check_control()
-        with _library():
+        with library():
             dropped = self._stop()
             self._stream = self._camera.create_stream(None, None)
             if self._stream is None:
-                raise _gone("its stream cannot be opened")
+                raise gone("its stream cannot be opened")
             self._exposure_us = features.read_settings(self._nodes)["exposure_us"]
             payload = self._camera.get_payload()
             for _ in range(min(shots + 4, KEPT_BUFFERS)):
@@ -250,13 +171,13 @@ class AravisDriver:
     def _check_control(self) -> None:
         """A camera that was without power answers again, but has forgotten us and its settings."""
         if self._lost:
-            raise _gone(self._lost)
-        with _library():
+            raise gone(self._lost)
+        with library():
             network = self._camera.is_gv_device()
             value = self._camera.get_device().read_register(CONTROL_REGISTER if network else 0)
         if network and not value & CONTROL_BITS:
             self._lost = "it was started anew"
-            raise _gone(self._lost)
+            raise gone(self._lost)
 
     def _stop(self) -> int:
         """Stop streaming; returns how many frames had come and were not fetched."""
@@ -273,7 +194,7 @@ class AravisDriver:
     def trigger(self) -> None:
         """Expose now."""
         self._fired.append(time.monotonic_ns())
-        with _library():
+        with library():
             self._camera.software_trigger()
 
     def collect(self) -> None:
@@ -282,7 +203,7 @@ class AravisDriver:
     def poll(self, timeout_s: float) -> Sequence[Picture]:
         """Frames that have come, waiting at most so long for the first."""
         if self._lost:
-            raise _gone(self._lost)
+            raise gone(self._lost)
         pictures = []
         buffer = self._stream.timeout_pop_buffer(int(timeout_s * 1e6))
         while buffer is not None:
@@ -310,7 +231,7 @@ class AravisDriver:
         try:
             header["width"] = int(buffer.get_image_width())
             header["height"] = int(buffer.get_image_height())
-            header["pixel_format"] = _pfnc(buffer.get_image_pixel_format())
+            header["pixel_format"] = pfnc(buffer.get_image_pixel_format())
             return header, bytes(buffer.get_image_data())
         except (GLib.Error, TypeError, ValueError):
             # A frame whose first packet is missing says neither its size nor its format.
@@ -318,12 +239,12 @@ class AravisDriver:
 
     def disarm(self) -> None:
         """Take no more triggers."""
-        with _library():
+        with library():
             self._stop()
 
     def clock(self, count: int) -> Sequence[Sequence[int]]:
         """Latched readings; without a latch, frames made by command bracket the clock."""
-        with _library():
+        with library():
             readings = [features.latch(self._nodes) for _ in range(count)]
         found = [reading for reading in readings if reading is not None]
         return found or self._brackets[-count:]
@@ -341,33 +262,3 @@ class AravisDriver:
         with contextlib.suppress(GLib.Error):
             self._stop()
         self._stream = self._nodes = self._camera = None
-
-
-def _pfnc(code: int) -> str:
-    return _PFNC.get(code, f"0x{code:08x}")
-
-
-_PFNC = {
-    getattr(Aravis, constant): name
-    for constant, name in {
-        "PIXEL_FORMAT_MONO_8": "Mono8",
-        "PIXEL_FORMAT_MONO_10": "Mono10",
-        "PIXEL_FORMAT_MONO_12": "Mono12",
-        "PIXEL_FORMAT_MONO_14": "Mono14",
-        "PIXEL_FORMAT_MONO_16": "Mono16",
-        "PIXEL_FORMAT_RGB_8_PACKED": "RGB8",
-        "PIXEL_FORMAT_BGR_8_PACKED": "BGR8",
-        "PIXEL_FORMAT_RGBA_8_PACKED": "RGBa8",
-        "PIXEL_FORMAT_BGRA_8_PACKED": "BGRa8",
-    }.items()
-    if hasattr(Aravis, constant)
-}
-_PFNC.update(
-    {
-        getattr(Aravis, f"PIXEL_FORMAT_BAYER_{pattern}_{bits}"): f"Bayer{pattern}{bits}"
-        for pattern in ("RG", "GR", "GB", "BG")
-        for bits in (8, 10, 12, 16)
-        if hasattr(Aravis, f"PIXEL_FORMAT_BAYER_{pattern}_{bits}")
-    }
-)
-_PFNC.update({0x010A0046: "Mono10p", 0x010C0047: "Mono12p"})

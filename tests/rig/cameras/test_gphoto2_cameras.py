@@ -15,7 +15,7 @@ from camera_rigs import CameraRig, gphoto2_rig
 
 from geometry.errors import DeviceError, InputError
 from rig.cameras.base import ArmSpec, CameraSettings, TriggerKind
-from rig.cameras.remote import RemoteCamera
+from rig.cameras.remotecamera import RemoteCamera
 
 pytestmark = pytest.mark.needs_gphoto2
 
@@ -90,7 +90,7 @@ def test_files_nobody_wants_stay_out(tmp_path: Path) -> None:
         camera = opened(rig)
         camera.arm(ArmSpec("a", 1, 5.0))
         camera.software_trigger()
-        assert camera.wait_frames(1, 0.6) == ()
+        assert camera.wait_frames(1, 0.4) == ()
 
 
 def test_settings_are_the_nearest_of_the_bodys_menu(edge: CameraRig) -> None:

@@ -20,7 +20,7 @@ from camera_rigs import files_rig
 import rig
 from geometry.errors import DeviceError, InputError
 from rig.cameras.base import ArmSpec
-from rig.cameras.remote import PING_S, RemoteCamera, WorkerSpec
+from rig.cameras.remotecamera import PING_S, RemoteCamera, WorkerSpec
 from rig.cameras.workers import serve, wire
 
 
