@@ -190,7 +190,7 @@ class CameraDevice(Protocol):
         ...
 
     def clock_samples(self, count: int) -> Sequence[ClockSample]:
-        """Readings of the camera's clock; empty unless timestamps are its own."""
+        """Readings of the camera's clock; empty unless timestamps are ``DEVICE`` or ``PTP``."""
         ...
 
     def health(self) -> CameraHealth:
