@@ -342,7 +342,7 @@ def test_bad_lines(fault: str) -> None:
         FaultProxy(fake.url, PtyEndpoint(), script) as proxy,
         opened(proxy.url) as driver,
     ):
-        for number in range(6):
+        for number in range(3):
             capture = f"a{number}"
             before = rises(fake)
             try:
@@ -359,7 +359,7 @@ def test_bad_lines(fault: str) -> None:
             elif outcome is Outcome.NOT_FIRED:
                 assert not made
         assert proxy.done[fault] > 0
-    assert fired >= 3
+    assert fired >= 2
 
 
 def test_latency_of_an_ftdi_adapter_and_merged_reads() -> None:
@@ -448,7 +448,7 @@ def test_a_socket_closed_by_the_other_side_is_noticed() -> None:
 )
 def test_a_box_with_bad_manners(faults: FakeFaults) -> None:
     with start_fake(FakeSettings(seed=3), faults) as fake, opened(fake.url) as driver:
-        for number in range(5):
+        for number in range(3):
             before = rises(fake)
             capture = f"a{number}"
             driver.arm(request_for(capture))
@@ -457,7 +457,7 @@ def test_a_box_with_bad_manners(faults: FakeFaults) -> None:
             assert rises(fake) - before == ONE_EACH
 
 
-@pytest.mark.parametrize("after", [40, 46, 50, 54])
+@pytest.mark.parametrize("after", [46, 52])
 def test_a_box_that_falls_silent(after: int) -> None:
     with (
         start_fake(faults=FakeFaults(silent_after=after)) as fake,

@@ -27,7 +27,7 @@ def check(tally: Tally, fires: int) -> None:
 
 
 def test_some_hundred_fires() -> None:
-    check(fire_side_by_side(300, seed=7, boxes=12), 300)
+    check(fire_side_by_side(240, seed=7, boxes=16), 240)
 
 
 @pytest.mark.slow
