@@ -26,7 +26,8 @@ from rig.trigger.driver import BoxAddress, SerialTriggerBox
 from rig.trigger.endpoint import PtyEndpoint
 from rig.trigger.fake.device import FakeSettings
 from rig.trigger.fake.program import FakeTrigger, start_fake
-from rig.trigger.proxy import FaultProxy, FaultRates, ProxyScript
+from rig.trigger.faultscript import FaultRates, ProxyScript
+from rig.trigger.proxy import FaultProxy
 
 FAULT_RATE = 0.05
 MISHAP_RATE = 0.01

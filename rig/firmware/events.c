@@ -19,7 +19,7 @@ struct event {
 };
 
 static struct event events[LOG_SIZE];
-static uint16_t last;
+static uint16_t last_number;
 static uint8_t kept;
 static uint8_t unsent;
 static uint8_t position; /* where the next one goes */
@@ -68,7 +68,7 @@ static struct event *add(enum event_kind kind)
     position = (position + 1) & (LOG_SIZE - 1);
     memset(event, 0, sizeof *event);
     event->kind = kind;
-    last = last == UINT16_MAX ? 1 : last + 1;
+    last_number = last_number == UINT16_MAX ? 1 : last_number + 1;
     if (kept < LOG_SIZE) {
         kept++;
     }
@@ -163,7 +163,7 @@ static void say_fields(const struct event *event)
 /* The event `back` before the last; numbers skip 0 when they wrap. */
 static uint16_t number_of(uint8_t back)
 {
-    return last > back ? last - back : last - back - 1;
+    return last_number > back ? last_number - back : last_number - back - 1;
 }
 
 bool events_send(void)
@@ -210,5 +210,5 @@ void events_say(uint16_t number)
 
 uint16_t events_last(void)
 {
-    return last;
+    return last_number;
 }

@@ -13,7 +13,7 @@ from collections import OrderedDict
 from collections.abc import Callable
 
 from geometry.errors import ConflictError, DeviceError, InterlockError, RigwrightError
-from rig.trigger.box import FireReport, Outcome, TriggerState
+from rig.trigger.box import Outcome, TriggerState
 from rig.trigger.flight import Flight, full_report, plain_report
 from rig.trigger.keeper import Keeper
 from rig.trigger.lines import ErrorCode
@@ -306,31 +306,6 @@ class Captures:
         return ConflictError(
             "trigger-refused", f"the box does not do it: {refused}", "abort, then try again"
         )
-
-
-def known_report(flight: Flight, problem: str) -> FireReport:
-    """The best word on a capture whose report is not there in time."""
-    if flight.result is not None:
-        return full_report(flight, flight.result, None)
-    if flight.fire_sent:
-        return plain_report(flight, Outcome.UNKNOWN, problem or "the box has not answered yet")
-    if flight.wanted:
-        return plain_report(flight, Outcome.UNKNOWN, "it is armed still; FIRE was not given")
-    return plain_report(flight, Outcome.NOT_FIRED, "FIRE was never sent")
-
-
-def stranger_report(capture_id: str, result: BoxResult | None, why: str) -> FireReport:
-    """The report of a capture that another process has armed."""
-    outcomes = {"FIRED": Outcome.FIRED, "PARTIAL": Outcome.PARTIAL, "NOT_FIRED": Outcome.NOT_FIRED}
-    known = result is not None
-    return FireReport(
-        capture_id=capture_id,
-        outcome=outcomes.get(result.result, Outcome.UNKNOWN) if result else Outcome.UNKNOWN,
-        shots_done=result.shots_done if result else 0,
-        shots_wanted=result.shots_wanted if result else 0,
-        acknowledged=known,
-        why=why,
-    )
 
 
 def _interlock() -> InterlockError:

@@ -12,8 +12,9 @@ from typing import Any
 
 from geometry.errors import DeviceError
 from rig.trigger.box import ArmRequest, FireReport, TriggerCapabilities, TriggerHealth
-from rig.trigger.captures import Captures, known_report, stranger_report
+from rig.trigger.captures import Captures
 from rig.trigger.clock import ClockModel
+from rig.trigger.flight import known_report, stranger_report
 from rig.trigger.jobs import PATIENCE_S, JobQueue
 from rig.trigger.keeper import BoxView, Keeper
 from rig.trigger.metrics import Metrics, WireLog

@@ -91,6 +91,30 @@ def full_report(flight: Flight, result: BoxResult, log: EdgeLog | None) -> FireR
     )
 
 
+def known_report(flight: Flight, problem: str) -> FireReport:
+    """The best word on a capture whose report is not there in time."""
+    if flight.result is not None:
+        return full_report(flight, flight.result, None)
+    if flight.fire_sent:
+        return plain_report(flight, Outcome.UNKNOWN, problem or "the box has not answered yet")
+    if flight.wanted:
+        return plain_report(flight, Outcome.UNKNOWN, "it is armed still; FIRE was not given")
+    return plain_report(flight, Outcome.NOT_FIRED, "FIRE was never sent")
+
+
+def stranger_report(capture_id: str, result: BoxResult | None, why: str) -> FireReport:
+    """The report of a capture that another process has armed."""
+    known = result is not None
+    return FireReport(
+        capture_id=capture_id,
+        outcome=OUTCOMES.get(result.result, Outcome.UNKNOWN) if result else Outcome.UNKNOWN,
+        shots_done=result.shots_done if result else 0,
+        shots_wanted=result.shots_wanted if result else 0,
+        acknowledged=known,
+        why=why,
+    )
+
+
 def host_edges(log: EdgeLog, fit: ClockFit) -> Iterator[Edge]:
     """Every change of every output in the complete shots, on the host's clock.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict, deque
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -79,14 +80,11 @@ def offsets(burst: Burst, made: list[PinEdge]) -> list[int]:
         for ticks, output, level in burst.edges()
     )
     assert sorted((e.output, e.level) for e in made) == sorted(w[1:] for w in wanted)
-    key = {(output, level): [] for _, output, level in wanted}
+    due: dict[tuple[int, int], deque[int]] = defaultdict(deque)
     for cycle, output, level in wanted:
-        key[output, level].append(cycle)
+        due[output, level].append(cycle)
     start = made[0].cycle - wanted[0][0]
-    late = []
-    for edge in made:
-        late.append(edge.cycle - start - key[edge.output, edge.level].pop(0))
-    return late
+    return [edge.cycle - start - due[edge.output, edge.level].popleft() for edge in made]
 
 
 def flood_of(seconds: float, noise: bool = False) -> bytes:

@@ -15,13 +15,14 @@ from __future__ import annotations
 
 import atexit
 import binascii
+import bisect
 import contextlib
 import os
 import select
 import shutil
 import signal
 import subprocess
-import time
+from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import IntFlag, StrEnum
@@ -164,6 +165,8 @@ class FirmwareSim:
         self.url = self._read("start", _START_S).removeprefix("ready ")
         self._seq = 0
         self._pending = b""
+        self._log_read = 0
+        self._log_rows: dict[str, list[tuple[int, str, int]]] = defaultdict(list)
         self.events: list[str] = []
         """Bodies of the events that came while something else was waited for."""
 
@@ -179,7 +182,9 @@ class FirmwareSim:
         self.close()
 
     def close(self) -> None:
-        """End the simulator, whatever it is doing."""
+        """End the simulator, whatever it is doing. Closing twice changes nothing."""
+        if self._process.stdout.closed:  # type: ignore[union-attr]
+            return
         atexit.unregister(self.close)
         with contextlib.suppress(OSError, ValueError):
             self._process.stdin.close()  # type: ignore[union-attr]
@@ -190,10 +195,15 @@ class FirmwareSim:
         self._process.wait(5)
         self._process.stdout.close()  # type: ignore[union-attr]
 
+    @property
+    def ended(self) -> bool:
+        """Whether the simulator has ended."""
+        return self._process.poll() is not None
+
     def _read(self, order: str, timeout_s: float) -> str:
         pipe = self._process.stdout
-        ready, _, _ = select.select([pipe], [], [], timeout_s)
-        line = pipe.readline() if ready else ""  # type: ignore[union-attr]
+        ready = pipe is not None and select.select([pipe], [], [], timeout_s)[0]
+        line = pipe.readline() if pipe is not None and ready else ""
         if not line:
             raise RuntimeError(f"{self.simulator} did not answer to {order[:60]!r}")
         return line.strip()
@@ -328,33 +338,36 @@ class FirmwareSim:
 
     # The log
 
-    def _logged(self) -> Iterator[tuple[int, str, int]]:
-        for row in self.log.read_text().splitlines():
+    def _logged(self, kind: str) -> list[tuple[int, str, int]]:
+        """The rows of one kind so far; what has been read once is not read again."""
+        with self.log.open() as file:
+            file.seek(self._log_read)
+            text = file.read()
+        whole = text.rpartition("\n")[0]
+        self._log_read += len(whole) + 1 if whole else 0
+        for row in whole.splitlines():
             cycle, what, value = row.split(" ")
-            yield int(cycle), what, int(value)
+            rows = self._log_rows["edge" if what.isdigit() else what]
+            rows.append((int(cycle), what, int(value)))
+        return self._log_rows[kind]
 
     def edges(self, since: int = 0) -> list[PinEdge]:
         """Every change of an output from a cycle on, as it was made."""
-        levels: dict[int, int] = {}
-        edges = []
-        for cycle, what, value in self._logged():
-            if what.isdigit() and levels.get(int(what), 0) != value:
-                levels[int(what)] = value
-                if cycle >= since:
-                    edges.append(PinEdge(cycle, int(what), value))
-        return edges
+        rows = self._logged("edge")
+        first = bisect.bisect_left(rows, (since, "", 0))
+        return [PinEdge(cycle, int(output), level) for cycle, output, level in rows[first:]]
 
     def sent(self) -> list[tuple[int, int]]:
         """Every byte of the box with the cycle at which it began: (cycle, byte)."""
-        return [(cycle, value) for cycle, what, value in self._logged() if what == "tx"]
+        return [(cycle, value) for cycle, _, value in self._logged("tx")]
 
     def received(self) -> list[tuple[int, int]]:
         """Every byte to the box with the cycle at which it was whole (on simavr: about)."""
-        return [(cycle, value) for cycle, what, value in self._logged() if what == "rx"]
+        return [(cycle, value) for cycle, _, value in self._logged("rx")]
 
     def resets(self) -> list[tuple[int, Reset]]:
         """Every start of the processor."""
-        return [(cycle, Reset(value)) for cycle, what, value in self._logged() if what == "reset"]
+        return [(cycle, Reset(value)) for cycle, _, value in self._logged("reset")]
 
 
 def unsealed(line: str) -> str:
@@ -363,16 +376,3 @@ def unsealed(line: str) -> str:
     if not star or checksum != f"{crc16(body.encode('ascii')):04X}":
         raise AssertionError(f"{line!r} has a wrong checksum or none")
     return body
-
-
-def wait_for_port(url: str, seconds: float = 5.0) -> None:
-    """Return when a box answers at an address, for programs that connect at once."""
-    import serial
-
-    end = time.monotonic() + seconds
-    with serial.serial_for_url(url, timeout=0.2) as port:
-        while time.monotonic() < end:
-            port.write(b"*IDN?\n")
-            if b"Rigwright" in port.readline():
-                return
-    raise TimeoutError(f"nothing answers at {url}")

@@ -12,10 +12,17 @@ from pathlib import Path
 
 import pytest
 
-from rig.trigger.box import ArmRequest, Pulse
+from geometry.errors import RigwrightError
+from rig.trigger.box import ArmRequest, Outcome, Pulse, TriggerState
 from rig.trigger.driver import BoxAddress, SerialTriggerBox
 from rig.trigger.fake.device import FakeSettings
 from rig.trigger.fake.program import FakeTrigger, start_fake
+
+ONE_EACH = {1: 1, 2: 1, 13: 1}
+"""The pulses of one shot of :func:`request_for`."""
+PROMPT_S = 2.0
+SLACK_S = 0.2
+GONE = (TriggerState.DISCONNECTED, TriggerState.OPENING)
 
 
 @dataclass(frozen=True)
@@ -115,3 +122,23 @@ def request_for(
         pulses[3] = Pulse(late_us, 100.0)
     interval_us = late_us + 5000.0 if shots > 1 else 0.0
     return ArmRequest(capture, pulses, shots=shots, interval_us=interval_us, lead_us=lead_us)
+
+
+def rises(fake: FakeTrigger) -> Counter[int]:
+    return of_fake(fake).rises()
+
+
+@contextmanager
+def named_in_time(kind: type[RigwrightError], code: str) -> Iterator[None]:
+    """What is inside fails with a code, within two seconds."""
+    began = time.monotonic()
+    with pytest.raises(kind) as caught:
+        yield
+    assert caught.value.code == code
+    assert time.monotonic() - began < PROMPT_S + SLACK_S
+
+
+def fire_whole(driver: SerialTriggerBox, capture: str) -> None:
+    driver.arm(request_for(capture))
+    driver.fire(capture)
+    assert driver.wait_done(capture, 2.0).outcome is Outcome.FIRED

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 import time
 from collections.abc import Callable
@@ -11,6 +12,7 @@ from pathlib import Path
 from geometry.errors import InputError
 from rig.trigger.endpoint import Endpoint, PtyEndpoint, TcpEndpoint
 from rig.trigger.fake.device import FakeBox, FakeSettings
+from rig.trigger.fake.esper import FakeEsper
 from rig.trigger.fake.faults import FakeFaults, FaultyLine
 from rig.trigger.fake.line import FakeLine
 from rig.trigger.fake.serving import FakeServer
@@ -78,6 +80,7 @@ class FakeOptions:
     """What can be asked of the fake program; all units as named, ``faults`` as text.
 
     ``link`` or ``port`` say where it is offered; with neither it is a bare pseudo-terminal.
+    ``esper`` serves an ESPER TriggerBox instead; of the rest it knows only ``serial_number``.
     """
 
     serial_number: str = "fake"
@@ -91,11 +94,22 @@ class FakeOptions:
     identity: str = ""
     reset_on_open: bool = False
     boot_s: float = 0.0
+    esper: bool = False
     stop: threading.Event = field(default_factory=threading.Event)
 
 
 def run_fake(options: FakeOptions, say: Callable[[str], None] = print) -> None:
     """Serve a fake trigger box until ``options.stop`` is set or Ctrl-C; says where it is."""
+    with _served(options) as server:
+        say(f"a fake trigger box answers at {server.url} (Ctrl-C ends it)")
+        with contextlib.suppress(KeyboardInterrupt):
+            options.stop.wait()
+
+
+def _served(options: FakeOptions) -> FakeServer:
+    if options.esper:
+        endpoint = _endpoint(options.link, options.port, None)
+        return FakeServer(FakeEsper(time.monotonic_ns, options.serial_number), endpoint)
     settings = FakeSettings(
         serial_number=options.serial_number,
         drift_ppm=options.drift_ppm,
@@ -106,15 +120,11 @@ def run_fake(options: FakeOptions, say: Callable[[str], None] = print) -> None:
         boot_s=options.boot_s,
     )
     faults = FakeFaults.parse(options.faults) if options.faults else None
-    with start_fake(
+    fake = start_fake(
         settings,
         faults,
         link=options.link,
         port=options.port,
         reset_on_open=options.reset_on_open,
-    ) as fake:
-        say(f"a fake trigger box answers at {fake.url} (Ctrl-C ends it)")
-        try:
-            options.stop.wait()
-        except KeyboardInterrupt:
-            say(f"ended; {len(fake.box.edges)} edges were made")
+    )
+    return fake.server

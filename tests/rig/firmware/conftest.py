@@ -6,43 +6,37 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from firmware_sim import FirmwareSim, Simulator, SimulatorMissing, built
+from firmware_sim import FirmwareSim, Simulator
+from firmware_started import started
 
-BOOT_MS = 30.0
-
-
-def started(simulator: Simulator, log: Path) -> FirmwareSim:
-    """A box that has just started and has said so; skips the test where there is none."""
-    try:
-        built(simulator)
-    except SimulatorMissing as reason:
-        pytest.skip(str(reason))
-    box = FirmwareSim(simulator, log)
-    box.run(BOOT_MS)
-    return box
+SIMAVR = pytest.param(Simulator.SIMAVR, marks=pytest.mark.needs_avr, id="simavr")
+AVR8JS = pytest.param(Simulator.AVR8JS, marks=pytest.mark.needs_node, id="avr8js")
 
 
-@pytest.fixture(
-    params=[
-        pytest.param(Simulator.SIMAVR, marks=pytest.mark.needs_avr, id="simavr"),
-        pytest.param(Simulator.AVR8JS, marks=pytest.mark.needs_node, id="avr8js"),
-    ]
-)
+@pytest.fixture(params=[SIMAVR, AVR8JS])
 def box(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[FirmwareSim]:
     """A stopped box after its start, on both simulators."""
     with started(request.param, tmp_path / "edges.log") as simulated:
         yield simulated
 
 
-@pytest.fixture
-def one_box(tmp_path: Path) -> Iterator[FirmwareSim]:
+@pytest.fixture(params=[SIMAVR])
+def one_box(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[FirmwareSim]:
     """The same on simavr only, for what no simulator sees differently."""
-    with started(Simulator.SIMAVR, tmp_path / "edges.log") as simulated:
+    with started(request.param, tmp_path / "edges.log") as simulated:
         yield simulated
 
 
-@pytest.fixture
-def js_box(tmp_path: Path) -> Iterator[FirmwareSim]:
+@pytest.fixture(params=[AVR8JS])
+def js_box(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[FirmwareSim]:
     """The same on avr8js only, for what simavr gets wrong."""
-    with started(Simulator.AVR8JS, tmp_path / "edges.log") as simulated:
+    with started(request.param, tmp_path / "edges.log") as simulated:
         yield simulated
+
+
+@pytest.fixture(params=[SIMAVR, AVR8JS])
+def device_url(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[str]:
+    """The address of a box that runs with the wall clock, for whatever opens a serial port."""
+    with started(request.param, tmp_path / "edges.log") as simulated:
+        simulated.pace("real")
+        yield simulated.url

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+import serial
 from firmware_sim import FirmwareSim
 
 conformance = pytest.importorskip("rig.trigger.conformance")
@@ -30,3 +31,12 @@ def test_dialogue(box: FirmwareSim, dialogue: dict[str, Any]) -> None:
 
     line = SimulatedLine(box)
     conformance.play_dialogue(dialogue, line, line.hands())
+
+
+@pytest.mark.parametrize(
+    "name", ["a capture", "a burst", "a capture fires once, under whatever number"]
+)
+def test_dialogue_over_the_port(device_url: str, name: str) -> None:
+    dialogue = next(vector for vector in VECTORS["dialogues"] if vector["name"] == name)
+    with serial.serial_for_url(device_url, baudrate=115200, timeout=0.05) as port:
+        conformance.play_dialogue(dialogue, port, conformance.Hands())

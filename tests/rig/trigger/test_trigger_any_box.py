@@ -14,7 +14,8 @@ from geometry.errors import ConflictError, DeviceError, InputError, InterlockErr
 from rig.trigger.box import ArmRequest, Outcome, Pulse, TriggerState
 from rig.trigger.driver import BoxAddress, SerialTriggerBox
 from rig.trigger.endpoint import PtyEndpoint
-from rig.trigger.proxy import FaultProxy, FaultRates, Incident, ProxyScript
+from rig.trigger.faultscript import FaultRates, Incident, ProxyScript
+from rig.trigger.proxy import FaultProxy
 
 
 def test_a_capture_is_fired_once_and_reported_whole(box_under_test: AnyBox) -> None:

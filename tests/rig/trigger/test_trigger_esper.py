@@ -17,8 +17,9 @@ from rig.trigger.endpoint import PtyEndpoint
 from rig.trigger.esper import EsperTriggerBox
 from rig.trigger.fake.esper import FakeEsper
 from rig.trigger.fake.serving import FakeServer
+from rig.trigger.faultscript import FaultRates, Incident, ProxyScript
 from rig.trigger.metrics import WireLine
-from rig.trigger.proxy import FaultProxy, FaultRates, Incident, ProxyScript
+from rig.trigger.proxy import FaultProxy
 
 REQUEST = ArmRequest("a", {1: Pulse(0.0, 20_000.0), 3: Pulse(5000.0, 20_000.0)})
 

@@ -11,6 +11,8 @@ from trigger_boxes import opened, wait_until
 
 from geometry.errors import InputError
 from rig.trigger.conformance import Hands, load_vectors, play_dialogue, play_framing
+from rig.trigger.driver import BoxAddress
+from rig.trigger.esper import EsperTriggerBox
 from rig.trigger.fake.faults import FakeFaults
 from rig.trigger.fake.program import FakeOptions, run_fake, start_fake
 
@@ -54,6 +56,20 @@ def test_the_program_says_where_it_is_and_ends_when_told(where: str, tmp_path: P
     options.stop.set()
     thread.join()
     assert not (tmp_path / "box").exists()
+
+
+def test_the_program_can_be_an_esper_box() -> None:
+    said: list[str] = []
+    options = FakeOptions(serial_number="34", esper=True, port=0)
+    thread = threading.Thread(target=run_fake, args=(options, said.append))
+    thread.start()
+    wait_until(lambda: bool(said))
+    box = EsperTriggerBox(BoxAddress(said[0].split(" at ")[1].split(" ")[0]))
+    box.open()
+    assert box.health().serial_number == "34"
+    box.close()
+    options.stop.set()
+    thread.join()
 
 
 def test_faults_in_words() -> None:

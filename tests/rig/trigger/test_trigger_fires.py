@@ -12,7 +12,8 @@ from benchmarks.fires import Shooter, Tally, fire_all, fire_side_by_side, judge,
 from rig.trigger.box import FireReport, Outcome
 from rig.trigger.driver import BoxAddress, SerialTriggerBox
 from rig.trigger.endpoint import PtyEndpoint
-from rig.trigger.proxy import FaultProxy, FaultRates, ProxyScript
+from rig.trigger.faultscript import FaultRates, ProxyScript
+from rig.trigger.proxy import FaultProxy
 
 
 def check(tally: Tally, fires: int) -> None:
@@ -27,7 +28,7 @@ def check(tally: Tally, fires: int) -> None:
 
 
 def test_some_hundred_fires() -> None:
-    check(fire_side_by_side(300, seed=7, boxes=12), 300)
+    check(fire_side_by_side(240, seed=7, boxes=16), 240)
 
 
 @pytest.mark.slow

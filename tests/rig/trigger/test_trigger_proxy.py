@@ -13,7 +13,8 @@ import serial
 
 from geometry.errors import InputError
 from rig.trigger.endpoint import PtyEndpoint, TcpEndpoint
-from rig.trigger.proxy import FaultProxy, FaultRates, Incident, ProxyScript
+from rig.trigger.faultscript import FaultRates, Incident, ProxyScript
+from rig.trigger.proxy import FaultProxy
 
 
 class Bench:

@@ -37,6 +37,7 @@ export class Board {
     readHex(readFileSync(hexPath, "ascii"), new Uint8Array(this.program.buffer));
     this.log = openSync(logPath, "w");
     this.lines = [];
+    this.levels = new Array(17).fill(0);
     this.eeprom = new EEPROMMemoryBackend(EEPROM_BYTES);
     this.cyclesBefore = 0;
     this.interlockOpen = false;
@@ -85,6 +86,9 @@ export class Board {
     };
     this.watchdogBites = false;
     this.note("reset", flags);
+    this.levels.forEach((level, output) => {
+      this.setLevel(output, 0); // the pins are inputs now, which a resistor pulls low
+    });
     this.setInterlock(this.interlockOpen);
     this.afterReset();
   }
@@ -101,10 +105,17 @@ export class Board {
       const changed = (value ^ before) & mask;
       for (let bit = 0; bit < 8; bit++) {
         if (changed & (1 << bit)) {
-          this.note(first + bit, (value >> bit) & 1);
+          this.setLevel(first + bit, (value >> bit) & 1);
         }
       }
     });
+  }
+
+  setLevel(output, level) {
+    if (this.levels[output] !== level) {
+      this.levels[output] = level;
+      this.note(output, level);
+    }
   }
 
   setInterlock(open) {

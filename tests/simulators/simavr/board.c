@@ -8,10 +8,11 @@
 #include "runner.h"
 
 #define MCUSR 0x54
-#define WDTCSR 0x60
 #define RAM_BEGIN 0x100
 #define PORF 0x01
+#define WDRF 0x08
 #define INTERLOCK_PIN 4
+#define OUTPUTS 16
 
 avr_t *avr;
 
@@ -19,6 +20,9 @@ static FILE *log_file;
 static uint64_t cycles_before; /* of the processor's present run */
 static bool interlock_open;
 static char output_numbers[4 * 8]; /* by port and bit */
+static bool levels[OUTPUTS + 1];
+static void (*own_reset)(struct avr_t *);
+static bool was_reset;
 
 uint64_t board_cycle(void)
 {
@@ -35,10 +39,24 @@ void board_log_flush(void)
     fflush(log_file);
 }
 
+static void set_level(int output, bool level)
+{
+    if (levels[output] != level) {
+        levels[output] = level;
+        fprintf(log_file, "%llu %d %d\n", (unsigned long long)board_cycle(), output, level);
+    }
+}
+
 static void pin_changed(struct avr_irq_t *irq, uint32_t value, void *number)
 {
     (void)irq;
-    fprintf(log_file, "%llu %d %u\n", (unsigned long long)board_cycle(), *(char *)number, value);
+    set_level(*(char *)number, value);
+}
+
+static void note_reset(struct avr_t *of)
+{
+    own_reset(of);
+    was_reset = true;
 }
 
 static void no_sleep(avr_t *of, avr_cycle_count_t cycles)
@@ -76,6 +94,11 @@ void board_interlock(bool open)
 static void after_reset(uint8_t flags)
 {
     avr->data[MCUSR] = flags;
+    was_reset = false;
+    board_log("reset", flags);
+    for (int output = 1; output <= OUTPUTS; output++) {
+        set_level(output, false); /* the pins are inputs now, which a resistor pulls low */
+    }
     /* Outputs 7 and 8 are also inputs of external interrupts. Nobody uses these, but simavr would
      * look at a low one in every cycle. */
     for (uint8_t i = 0; i < 2; i++) {
@@ -84,6 +107,16 @@ static void after_reset(uint8_t flags)
     serial_attach();
     order_attach();
     board_interlock(interlock_open);
+}
+
+void board_poke(uint16_t address, uint8_t value)
+{
+    avr_io_addr_t io = AVR_DATA_TO_IO(address);
+    if (address >= AVR_IO_TO_DATA(0) && address < RAM_BEGIN && avr->io[io].w.c) {
+        avr->io[io].w.c(avr, address, value, avr->io[io].w.param);
+    } else {
+        avr_core_watch_write(avr, address, value);
+    }
 }
 
 void board_reset(uint8_t flags)
@@ -96,7 +129,6 @@ void board_reset(uint8_t flags)
         }
     }
     avr_reset(avr);
-    board_log("reset", flags);
     after_reset(flags);
 }
 
@@ -112,6 +144,8 @@ void board_load(const char *elf, const char *log)
     }
     avr = avr_make_mcu_by_name("atmega328p");
     avr_init(avr);
+    own_reset = avr->reset;
+    avr->reset = note_reset;
     avr->frequency = CLOCK_HZ;
     avr->sleep = no_sleep;
     avr_load_firmware(avr, &firmware);
@@ -130,10 +164,9 @@ void board_run(uint64_t cycle, const bool *stop)
     while (board_cycle() < cycle && !*stop) {
         avr_cycle_count_t before = avr->cycle;
         int state = avr_run(avr);
-        if (avr->cycle < before) { /* the watchdog has reset it */
-            cycles_before += before;
-            board_log("reset", avr->data[MCUSR]);
-            after_reset(avr->data[MCUSR]);
+        if (was_reset) { /* by the watchdog, which may have set the cycles back */
+            cycles_before += avr->cycle < before ? before : 0;
+            after_reset(WDRF);
         }
         if (state == cpu_Done || state == cpu_Crashed) {
             fprintf(stderr, "the processor stopped at %#x\n", avr->pc);

@@ -49,7 +49,7 @@ static bool do_now(const char *order)
     } else if (sscanf(order, "poke %u %n", &value, &read) == 1 && read) {
         size_t count = from_hex(order + read, bytes, sizeof bytes);
         for (size_t i = 0; i < count; i++) {
-            avr_core_watch_write(avr, (uint16_t)(value + i), bytes[i]);
+            board_poke((uint16_t)(value + i), bytes[i]);
         }
     } else {
         return false;

@@ -21,6 +21,9 @@ void board_log_flush(void);
 uint64_t board_cycle(void);
 void board_interlock(bool open);
 
+/* Write to the data space as an instruction would, registers' effects included. */
+void board_poke(uint16_t address, uint8_t value);
+
 /* `flags` as in MCUSR; a power-up also spoils the RAM. */
 void board_reset(uint8_t flags);
 
