@@ -123,16 +123,19 @@ enum error box_arm(const struct arming *arming)
 
 static void fault(uint8_t why)
 {
+    struct result *struck = NULL;
     burst_stop();
     if (state == STATE_FIRING) {
-        current->phase = PHASE_PARTIAL;
+        struck = current;
+        struck->phase = PHASE_PARTIAL;
     } else if (state == STATE_ARMED) {
-        current->phase = PHASE_NOT_FIRED;
+        struck = current;
+        struck->phase = PHASE_NOT_FIRED;
     }
     telling = false;
     state = STATE_FAULT;
     fault_why = why;
-    events_add(EVENT_FAULT, current, why);
+    events_add(EVENT_FAULT, struck, why);
 }
 
 enum error box_fire(struct instant *start)

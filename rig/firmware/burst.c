@@ -126,6 +126,7 @@ struct instant burst_start(struct result *of, uint32_t lead, uint32_t interval)
     side = 0;
     shot_late = 0;
     of->start = start;
+    __asm__ volatile("" ::: "memory"); /* a reset between the two must find the instant first */
     of->phase = PHASE_FIRING;
     schedule(shot_start + edges[0].at);
     TIMSK1 |= _BV(OCIE1A);
