@@ -11,7 +11,6 @@ from trigger_boxes import AnyBox, any_box, box_kinds, opened
 from rig.trigger.driver import SerialTriggerBox
 from rig.trigger.fake.program import FakeTrigger, start_fake
 
-
 KINDS = [
     pytest.param(kind, marks=() if kind == "fake" else pytest.mark.slow) for kind in box_kinds()
 ]
