@@ -11,8 +11,12 @@ from trigger_boxes import AnyBox, any_box, box_kinds, opened
 from rig.trigger.driver import SerialTriggerBox
 from rig.trigger.fake.program import FakeTrigger, start_fake
 
+KINDS = [
+    pytest.param(kind, marks=() if kind == "fake" else pytest.mark.slow) for kind in box_kinds()
+]
 
-@pytest.fixture(params=box_kinds())
+
+@pytest.fixture(params=KINDS)
 def box_under_test(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[AnyBox]:
     with any_box(request.param, tmp_path) as box:
         yield box

@@ -84,8 +84,8 @@ def test_each_fault(fault: str, check: object) -> None:
 
 
 def test_late_lines_keep_their_order_and_overtaken_ones_do_not() -> None:
-    with bench(ProxyScript(FaultRates(delay=0.5, delay_s=0.05), seed=1)) as line:
-        assert line.to_box(LINES, 1.5) == LINES
+    with bench(ProxyScript(FaultRates(delay=0.5, delay_s=0.02), seed=1)) as line:
+        assert line.to_box(LINES, 0.7) == LINES
         assert line.proxy.done["delay"] > 5
     with bench(ProxyScript(FaultRates(reorder=0.5, delay_s=0.05), seed=1)) as line:
         come = line.to_box(LINES, 0.3)
