@@ -14,9 +14,10 @@ import numpy as np
 
 from geometry.arrays import Floats
 
-_ZOOMS = 12
-_SIDE = 17
-_KEPT = 6
+_ZOOMS = 11
+_SIDE = 13
+_KEPT = 3
+_ZOOMED = 10
 _NOMINAL_SIGMA = 0.1
 """An exposure time that a camera states is believed to this share of itself."""
 
@@ -66,41 +67,45 @@ def solve_interval(
     The middle is between 0 and ``2**bits``, the length at most a quarter of that.
     """
     bits = len(shares)
-    best: tuple[float, float, float] | None = None
+    starts: list[tuple[float, float, float, float]] = []
     for level in range(-3, bits - 2):
-        starts = _starts(shares, level, nominal_length_ticks)
-        if starts is None:
-            continue
-        found = _zoom(shares, sigmas, *starts, 2.0 ** max(level, 0), nominal_length_ticks)
-        if best is None or found[0] < best[0]:
-            best = found
-    if best is None:
+        starts += _starts(shares, sigmas, level, nominal_length_ticks)
+    if not starts:
         # The stated length is beyond what the board can show; all lengths are tried instead.
         return solve_interval(shares, sigmas)
-    _, middle, length = best
+    found = [_zoom(shares, sigmas, s, nominal_length_ticks) for s in sorted(starts)[:_ZOOMED]]
+    _, middle, length = min(found)
     if length < _SHORT_TICKS:
         return _averaged(shares, sigmas, middle, nominal_length_ticks)
     return _with_errors(shares, sigmas, middle, length, nominal_length_ticks)
 
 
-def _starts(shares: Floats, level: int, nominal: float | None) -> tuple[Floats, Floats] | None:
-    """Middles and lengths to begin from, for lengths of ``2**level`` to ``2**(level + 1)`` ticks.
+def _starts(
+    shares: Floats, sigmas: Floats, level: int, nominal: float | None
+) -> list[tuple[float, float, float, float]]:
+    """Places to search from, for lengths of ``2**level`` to ``2**(level + 1)`` ticks.
 
-    A bit whose value lasts longer than the exposure changes at most once in it, and then its
-    larger share is its value in the middle; so those bits give the middle to within one such
-    time, by plain Gray decoding.
+    Each is (cost, middle, length, how far the middle may be off). A bit whose value lasts longer
+    than the exposure changes at most once in it, and then its larger share is its value in the
+    middle; so those bits give the middle to within one such time, by plain Gray decoding.
     """
     low, high = 2.0**level, 2.0 ** (level + 1)
     if nominal is not None and not 0.6 * low <= nominal <= 1.6 * high:
-        return None
+        return []
     bits = len(shares)
     first = min(max(level, 0), bits - 1)
     bit = shares[first:] > 0.5
     binary = np.logical_xor.accumulate(bit[::-1])[::-1]
     count = float((binary * 2.0 ** np.arange(first, bits)).sum())
     step = 2.0**first
-    middles = count + step * np.linspace(-1.5, 2.5, 81)
-    return middles, np.geomspace(low, high, 9)
+    middles, lengths = count + step * np.linspace(-1.5, 2.5, 81), np.geomspace(low, high, 9)
+    grid_m, grid_l = np.meshgrid(middles, lengths, indexing="ij")
+    cost = _cost(shares, sigmas, grid_m, grid_l, nominal)
+    best = np.argsort(cost, axis=None)[: 4 * _KEPT : 4]
+    return [
+        (float(cost.flat[k]), float(grid_m.flat[k]), float(grid_l.flat[k]), 0.08 * step)
+        for k in best
+    ]
 
 
 def _cost(
@@ -114,35 +119,23 @@ def _cost(
 
 
 def _zoom(
-    shares: Floats,
-    sigmas: Floats,
-    middles: Floats,
-    lengths: Floats,
-    step: float,
-    nominal: float | None,
+    shares: Floats, sigmas: Floats, start: tuple[float, float, float, float], nominal: float | None
 ) -> tuple[float, float, float]:
-    """Least cost near the starts, and where: (cost, middle, length).
+    """Least cost near a start, and where: (cost, middle, length).
 
-    The cost is piecewise smooth with kinks at every tick, so grids that shrink round the best few
-    places are surer than following slopes.
+    The cost is piecewise smooth with kinks at every tick, so grids that shrink round the best
+    place are surer than following slopes.
     """
-    grid_m, grid_l = np.meshgrid(middles, lengths, indexing="ij")
-    cost = _cost(shares, sigmas, grid_m, grid_l, nominal)
-    order = np.argsort(cost, axis=None)[: 4 * _KEPT]
-    best = (np.inf, 0.0, 1.0)
-    for index in order[:: max(1, len(order) // _KEPT)]:
-        here = (float(cost.flat[index]), float(grid_m.flat[index]), float(grid_l.flat[index]))
-        half_m, half_l = 0.08 * step, 0.12 * here[2]
-        for _ in range(_ZOOMS):
-            m = here[1] + half_m * np.linspace(-1.0, 1.0, _SIDE)
-            n = np.maximum(here[2] + half_l * np.linspace(-1.0, 1.0, _SIDE), _SHORTEST_TICKS)
-            gm, gl = np.meshgrid(m, n, indexing="ij")
-            value = _cost(shares, sigmas, gm, gl, nominal)
-            k = int(value.argmin())
-            here = min(here, (float(value.flat[k]), float(gm.flat[k]), float(gl.flat[k])))
-            half_m, half_l = 0.4 * half_m, 0.4 * half_l
-        best = min(best, here)
-    return best
+    here, half_m, half_l = start[:3], start[3], 0.12 * start[2]
+    for _ in range(_ZOOMS):
+        middles = here[1] + half_m * np.linspace(-1.0, 1.0, _SIDE)
+        lengths = here[2] + half_l * np.linspace(-1.0, 1.0, _SIDE)
+        grid_m, grid_l = np.meshgrid(middles, np.maximum(lengths, _SHORTEST_TICKS), indexing="ij")
+        cost = _cost(shares, sigmas, grid_m, grid_l, nominal)
+        k = int(cost.argmin())
+        here = min(here, (float(cost.flat[k]), float(grid_m.flat[k]), float(grid_l.flat[k])))
+        half_m, half_l = 0.45 * half_m, 0.45 * half_l
+    return here
 
 
 def _with_errors(

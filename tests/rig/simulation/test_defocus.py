@@ -78,8 +78,12 @@ def thin_lens(camera: RigCamera, scene: SceneSettings, rays: int) -> np.ndarray:
     radius = 0.5 * diameter * np.sqrt((np.arange(rays) + 0.5) / rays)
     total = 0.0
     for x, y in np.stack([radius * np.cos(turn), radius * np.sin(turn)], axis=1):
-        pose = Pose(camera.pose.to_rig(np.array([[x, y, 0.0]]))[0], camera.pose.rotation_rig_to_camera)
-        moved = camera.camera.principal_point_px + camera.camera.focal_length_px * np.array([x, y]) / s
+        pose = Pose(
+            camera.pose.to_rig(np.array([[x, y, 0.0]]))[0], camera.pose.rotation_rig_to_camera
+        )
+        moved = (
+            camera.camera.principal_point_px + camera.camera.focal_length_px * np.array([x, y]) / s
+        )
         pinhole = RigCamera("cam01", replace(camera.camera, principal_point_px=moved), pose, s)
         total = total + Studio([pinhole], scene, SHARP).light(SHOT)[..., 0]
     return np.asarray(total / rays)
@@ -122,6 +126,10 @@ def test_a_backdrop_does_not_shine_through_the_face() -> None:
 
 
 def test_a_scene_within_the_depth_of_field_stays_as_it_is() -> None:
-    camera = placed(lens(160, f_number=45.0), (0.0, -800.0, 0.0), target_mm=(0, 0, 0), focus_mm=800.0)
+    camera = placed(
+        lens(160, f_number=45.0), (0.0, -800.0, 0.0), target_mm=(0, 0, 0), focus_mm=800.0
+    )
     scene = SceneSettings(with_head=False, board=BoardSettings(PlaceSettings((0.0, 0.0, 0.0))))
-    assert np.array_equal(Studio([camera], scene).light(SHOT), Studio([camera], scene, SHARP).light(SHOT))
+    assert np.array_equal(
+        Studio([camera], scene).light(SHOT), Studio([camera], scene, SHARP).light(SHOT)
+    )

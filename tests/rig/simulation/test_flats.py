@@ -112,9 +112,9 @@ def test_charuco_corners_are_found_where_they_are_projected() -> None:
     assert len(corners) == 35
     flat = target(settings)
     grid = np.stack(np.meshgrid(np.arange(1, 8) - 4.0, np.arange(1, 6) - 3.0), axis=-1)
-    wanted = by_opencv(
-        CAMERA, np.array([on_flat(flat, *(24.0 * g)) for g in grid.reshape(-1, 2)])
-    )[np.ravel(numbers)]
+    wanted = by_opencv(CAMERA, np.array([on_flat(flat, *(24.0 * g)) for g in grid.reshape(-1, 2)]))[
+        np.ravel(numbers)
+    ]
     error = np.linalg.norm(corners.reshape(-1, 2) - wanted, axis=1)
     assert error.max() < 0.1
     assert np.sqrt((error**2).mean()) < 0.07
