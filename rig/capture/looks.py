@@ -11,9 +11,12 @@ from rig.cameras.base import Frame, Image
 from rig.capture.faults import Fault, FaultKind
 from rig.capture.take import Pairing
 
-BLACK_SHARE = 1.0 / 16.0
-"""A picture whose 99.9th percentile stays below this share of full scale shows nothing: the noise
-of a dark frame stays far below, the lit side of a face far above."""
+BLACK_SHARE = {8: 1.0 / 16.0, 16: 1.0 / 50.0}
+"""A picture whose 99.9th percentile stays below this share of full scale shows nothing, by bits.
+
+8 bits are gamma coded, 16 bits mostly linear and moved up to fill their range. The noise and
+offset of a dark frame stay below, the lit side of a face far above.
+"""
 
 STRIDE = 3
 """Every third row and column decide about blackness: enough of any face, a ninth of the work."""
@@ -67,9 +70,9 @@ def _look_at_file(data: bytes) -> Look:
 
 
 def _black(pixels: Image) -> bool:
-    full = float(np.iinfo(pixels.dtype).max)
+    depth = np.iinfo(pixels.dtype)
     thin = pixels[::STRIDE, ::STRIDE]
-    return bool(np.percentile(thin, 99.9) < BLACK_SHARE * full)
+    return bool(np.percentile(thin, 99.9) < BLACK_SHARE[depth.bits] * float(depth.max))
 
 
 def look_faults(pairing: Pairing, size_px: tuple[int, int] | None) -> list[Fault]:

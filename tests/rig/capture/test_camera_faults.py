@@ -5,10 +5,13 @@ from __future__ import annotations
 import random
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from memorybench import BenchMaker
 from memoryrig import CameraScript, memory_station, with_camera, with_policy
 
+from rig.cameras.base import Frame, FrameStatus
+from rig.capture.looks import look_at
 from rig.capture.verify import verify_session
 
 SHOTS = 3
@@ -128,3 +131,14 @@ def test_random_bursts_with_random_faults_have_no_wrong_pair(bench: BenchMaker, 
             lost = sorted(script.drop | script.miss)
             assert record.missing.get(camera, []) == lost
     assert verify_session(made.session.folder).whole
+
+
+@pytest.mark.parametrize(
+    ("level", "dtype", "black"),
+    [(8, np.uint8, True), (40, np.uint8, False), (800, np.uint16, True), (3000, np.uint16, False)],
+)
+def test_what_counts_as_black(level: int, dtype: type, black: bool) -> None:
+    """A dark frame's noise does, a face in poor light does not."""
+    noise = np.random.default_rng(3).normal(level, level / 8.0, (120, 160))
+    frame = Frame("SN", 0, FrameStatus.OK, pixels=noise.clip(0).astype(dtype))
+    assert look_at(frame).black == black

@@ -134,6 +134,11 @@ REFUSED = [
     ({"capture": {"image_format": "gif"}}, "capture.image_format", "'jpeg', 'png' or 'tiff'"),
     ({"capture": {"frame_deadline_s": 0.0}}, "capture.frame_deadline_s", "greater than 0"),
     ({"trigger": {"url": "x", "backend": "arduino"}}, "trigger.backend", "'rigwright' or 'esper'"),
+    (
+        {"trigger": {"url": "x", "backend": "esper", "lead_us": 5.0}},
+        "trigger",
+        "leave lead_us away",
+    ),
     ({"trigger": None}, "trigger", ""),
     ({"camera": []}, "camera", "at least 1"),
     ({"schema": "rigwright.rig/1"}, "schema", "rigwright.station/1"),
@@ -170,6 +175,12 @@ def test_two_things_cannot_be_one(key: str, value: object, problem: str) -> None
     with pytest.raises(InputError, match="station") as error:
         station_from_mapping(given_)
     assert problem in str(error.value)
+
+
+def test_an_esper_box_starts_with_fire() -> None:
+    for backend, lead_us in (("esper", 0.0), ("rigwright", 2000.0)):
+        station = station_from_mapping({**data(), "trigger": {"url": "x", "backend": backend}})
+        assert station.trigger is not None and station.trigger.lead_us == lead_us
 
 
 def test_what_is_no_station_file(tmp_path: Path) -> None:
