@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from io import BytesIO
 from typing import cast
 
 import numpy as np
@@ -53,20 +54,22 @@ def look_at(frame: Frame) -> Look:
 
 def _look_at_file(data: bytes) -> Look:
     import cv2
+    from PIL import Image as Pictures
 
-    flags = cv2.IMREAD_UNCHANGED | cv2.IMREAD_IGNORE_ORIENTATION
+    # An eighth each way is enough to see whether there is anything, and decodes in no time.
+    flags = cv2.IMREAD_REDUCED_GRAYSCALE_8 | cv2.IMREAD_IGNORE_ORIENTATION
     try:
+        size = Pictures.open(BytesIO(data)).size
         pixels = cv2.imdecode(np.frombuffer(data, np.uint8), flags)
-    except cv2.error:
-        # OpenCV throws for some damaged files and returns nothing for others.
-        pixels = None
-    if pixels is None or pixels.dtype not in (np.uint8, np.uint16):
+    except (OSError, SyntaxError, ValueError, cv2.error):
+        # Each damaged file makes the libraries throw something else, or return nothing.
         return Look(None, readable=False)
-    height, width = pixels.shape[:2]
+    if pixels is None:
+        return Look(None, readable=False)
     if data[:2] == b"\xff\xd8" and b"\xff\xd9" not in data[-4096:]:
         # The decoder fills what is missing of a JPEG that was cut off with grey.
-        return Look((width, height), readable=False)
-    return Look((width, height), _black(cast(Image, pixels)))
+        return Look(size, readable=False)
+    return Look(size, _black(cast(Image, pixels)))
 
 
 def _black(pixels: Image) -> bool:

@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from geometry.errors import InputError, TooLargeError
+from rig.capture.rigfacts import read_rig_design
 from rig.station.pulses import arm_request, station_pulses
 from rig.station.spec import ImageFormat, Interlock, Station
 from rig.station.stationfile import parse_station, read_station, station_from_mapping
@@ -203,6 +204,8 @@ def test_the_example_is_a_station() -> None:
     assert station.trigger is not None and station.trigger.url.startswith("fake:")
     assert {camera.backend for camera in station.cameras} == {"simulated"}
     assert station.simulation is not None and station.board is not None
+    design = read_rig_design(station)
+    assert set(design.cameras) == {camera.name for camera in station.cameras}
 
 
 KEYS = st.sampled_from(["name", "camera", "trigger", "capture", "led", "strobe", "schema", "x"])
