@@ -31,7 +31,7 @@ from rig.capture.rig import open_station
 from rig.capture.sessionfolder import Session
 from rig.capture.verify import verify_session
 
-LONGEST_S = 0.25
+LONGEST_S = 0.4
 """A capture takes a third of it: kills fall into every part of several captures."""
 
 FRESH_EVERY = 25

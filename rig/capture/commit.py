@@ -14,7 +14,7 @@ from rig.capture import places
 from rig.capture.jsonfiles import entry, model_bytes, signed
 from rig.capture.records import CaptureEntry, CaptureRecord, InterruptedEntry, SessionFile
 from rig.capture.storage import Disk
-from rig.capture.tables import tables
+from rig.capture.tables import Part, joined, part_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,6 +25,8 @@ class Books:
     disk: Disk
     manifest: SessionFile
     records: tuple[CaptureRecord, ...]
+    parts: tuple[Part, ...] = ()
+    """What the first of the records add to the tables, as far as that has been made."""
 
     def committed(self, capture_id: str) -> CaptureRecord | None:
         """The record of a committed capture."""
@@ -74,12 +76,13 @@ def publish(books: Books, record: CaptureRecord) -> Books:
 def write_books(books: Books) -> Books:
     """Write the tables and then ``session.json``; returns the books as they are written."""
     listed = []
-    for path, data in tables(books.records).items():
+    made = (*books.parts, *map(part_of, books.records[len(books.parts) :]))
+    for path, data in joined(made).items():
         books.disk.replace(books.folder / path, data, books.scratch)
         listed.append(entry(path, data))
     manifest = signed(books.manifest.model_copy(update={"tables": listed}))
     write_manifest(books, manifest)
-    return replace(books, manifest=manifest)
+    return replace(books, manifest=manifest, parts=made)
 
 
 def write_manifest(books: Books, manifest: SessionFile) -> None:

@@ -11,7 +11,7 @@ from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeout
 from typing import TypeVar
 
-from geometry.errors import DeviceError, InputError, RigwrightError
+from geometry.errors import RigwrightError
 from rig.cameras.base import CameraDevice, CameraHealth
 from rig.station.spec import CameraPlan
 
@@ -59,7 +59,8 @@ class CameraHand:
         """Disarm and close the camera, and end the thread; gives up on one that hangs."""
         done = self.do(_put_away)
         self._jobs.put(None)
-        with contextlib.suppress(RigwrightError, FutureTimeout):
+        # Whatever a dead camera's library throws, the others and the box must still be closed.
+        with contextlib.suppress(Exception):
             done.result(timeout_s)
 
 
@@ -85,8 +86,12 @@ def outcomes(
             done[name] = future.result(max(0.0, until - time.monotonic()))
         except FutureTimeout:
             problems[name] = f"it did not answer within {timeout_s:.3g} s"
-        except (DeviceError, InputError) as error:
+        except RigwrightError as error:
             problems[name] = error.problem
+        except Exception as error:  # noqa: BLE001
+            # After FIRE the other cameras' pictures are precious: a fault of one backend costs
+            # its own camera only, and is named.
+            problems[name] = f"its backend failed ({type(error).__name__}: {error})"
     return done, problems
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from io import BytesIO
 from typing import cast
 
 import numpy as np
@@ -11,9 +12,12 @@ from rig.cameras.base import Frame, Image
 from rig.capture.faults import Fault, FaultKind
 from rig.capture.take import Pairing
 
-BLACK_SHARE = 1.0 / 16.0
-"""A picture whose 99.9th percentile stays below this share of full scale shows nothing: the noise
-of a dark frame stays far below, the lit side of a face far above."""
+BLACK_SHARE = {8: 1.0 / 16.0, 16: 1.0 / 50.0}
+"""A picture whose 99.9th percentile stays below this share of full scale shows nothing, by bits.
+
+8 bits are gamma coded, 16 bits mostly linear and moved up to fill their range. The noise and
+offset of a dark frame stay below, the lit side of a face far above.
+"""
 
 STRIDE = 3
 """Every third row and column decide about blackness: enough of any face, a ninth of the work."""
@@ -50,26 +54,28 @@ def look_at(frame: Frame) -> Look:
 
 def _look_at_file(data: bytes) -> Look:
     import cv2
+    from PIL import Image as Pictures
 
-    flags = cv2.IMREAD_UNCHANGED | cv2.IMREAD_IGNORE_ORIENTATION
+    # An eighth each way is enough to see whether there is anything, and decodes in no time.
+    flags = cv2.IMREAD_REDUCED_GRAYSCALE_8 | cv2.IMREAD_IGNORE_ORIENTATION
     try:
+        size = Pictures.open(BytesIO(data)).size
         pixels = cv2.imdecode(np.frombuffer(data, np.uint8), flags)
-    except cv2.error:
-        # OpenCV throws for some damaged files and returns nothing for others.
-        pixels = None
-    if pixels is None or pixels.dtype not in (np.uint8, np.uint16):
+    except (OSError, SyntaxError, ValueError, cv2.error):
+        # Each damaged file makes the libraries throw something else, or return nothing.
         return Look(None, readable=False)
-    height, width = pixels.shape[:2]
+    if pixels is None:
+        return Look(None, readable=False)
     if data[:2] == b"\xff\xd8" and b"\xff\xd9" not in data[-4096:]:
         # The decoder fills what is missing of a JPEG that was cut off with grey.
-        return Look((width, height), readable=False)
-    return Look((width, height), _black(cast(Image, pixels)))
+        return Look(size, readable=False)
+    return Look(size, _black(cast(Image, pixels)))
 
 
 def _black(pixels: Image) -> bool:
-    full = float(np.iinfo(pixels.dtype).max)
+    depth = np.iinfo(pixels.dtype)
     thin = pixels[::STRIDE, ::STRIDE]
-    return bool(np.percentile(thin, 99.9) < BLACK_SHARE * full)
+    return bool(np.percentile(thin, 99.9) < BLACK_SHARE[depth.bits] * float(depth.max))
 
 
 def look_faults(pairing: Pairing, size_px: tuple[int, int] | None) -> list[Fault]:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 from annotated_types import Len
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from rig.cameras.base import CameraSettings
 from rig.station.spec import (
@@ -21,6 +21,7 @@ from rig.strict import CameraName, StrictModel
 
 Output = Annotated[int, Field(ge=1, le=64)]
 Microseconds = Annotated[float, Field(ge=0.0, le=1e9)]
+USUAL_LEAD_US = 2000.0
 
 
 class TriggerSection(StrictModel):
@@ -43,8 +44,10 @@ class TriggerSection(StrictModel):
         max_length=64,
         description="Serial number the box must have. Another box is refused.",
     )
-    lead_us: Microseconds = Field(
-        default=2000.0, description="From FIRE to the start of the first shot."
+    lead_us: Microseconds | None = Field(
+        default=None,
+        description="From FIRE to the start of the first shot. Without it: 2000, and 0 for an "
+        "ESPER box, which can hold none.",
     )
     interlock: Literal["required", "if-present"] = Field(
         default="if-present",
@@ -52,10 +55,18 @@ class TriggerSection(StrictModel):
         "`if-present`: only an open one stops a capture.",
     )
 
+    @model_validator(mode="after")
+    def _lead_that_can_be(self) -> Self:
+        if self.backend == "esper" and self.lead_us:
+            raise ValueError("an ESPER box starts with FIRE; leave lead_us away")
+        return self
+
     def to_plan(self) -> TriggerPlan:
         """The box as the rest of the program sees it."""
+        usual = 0.0 if self.backend == "esper" else USUAL_LEAD_US
+        lead = usual if self.lead_us is None else self.lead_us
         return TriggerPlan(
-            self.backend, self.url, self.serial_number, self.lead_us, Interlock(self.interlock)
+            self.backend, self.url, self.serial_number, lead, Interlock(self.interlock)
         )
 
 

@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import random
 from dataclasses import replace
+from io import BytesIO
 
+import numpy as np
 import pytest
 from memorybench import BenchMaker
 from memoryrig import CameraScript, memory_station, with_camera, with_policy
+from PIL import Image
 
+from rig.cameras.base import Frame, FrameStatus
+from rig.capture.looks import look_at
 from rig.capture.verify import verify_session
 
 SHOTS = 3
@@ -62,6 +67,49 @@ def test_a_wrong_size_is_told_where_the_size_is_known(bench: BenchMaker) -> None
     assert [fault.kind for fault in record.faults] == ["wrong-size"]
     assert "32 x 24 pixels, 64 x 48 are expected" in record.faults[0].text
     assert record.state == "partial"
+
+
+@pytest.mark.parametrize(
+    ("method", "kinds"),
+    [("wait_frames", ["missing"]), ("configure", ["not-ready"]), ("disarm", [])],
+)
+def test_a_backend_that_fails_costs_its_own_camera_only(
+    bench: BenchMaker, monkeypatch: pytest.MonkeyPatch, method: str, kinds: list[str]
+) -> None:
+    made = bench()
+
+    def fail(*_: object) -> None:
+        raise OSError("the library fell over")
+
+    monkeypatch.setattr(made.devices.camera("cam02"), method, fail)
+    record = made.rig.capture(made.session, "smile", allow_partial=True).record
+    assert [fault.kind for fault in record.faults] == kinds
+    assert all("OSError: the library fell over" in fault.text for fault in record.faults)
+    assert len(record.frames) == (2 if kinds else 3)
+
+
+def test_a_file_that_a_camera_made_is_looked_at(bench: BenchMaker) -> None:
+    def jpeg(level: int, size: tuple[int, int]) -> bytes:
+        buffer = BytesIO()
+        Image.new("RGB", size, (level, level, level)).save(buffer, "JPEG")
+        return buffer.getvalue()
+
+    station = with_camera(memory_station(3), "cam03", image_size_px=(64, 48))
+    whole = jpeg(120, (64, 48))
+    made = bench(
+        station,
+        {
+            "cam01": CameraScript(encoded=jpeg(2, (64, 48))),
+            "cam02": CameraScript(encoded=whole[:-40]),
+            "cam03": CameraScript(encoded=jpeg(120, (32, 48))),
+        },
+    )
+    record = made.rig.capture(made.session, "smile").record
+    assert {(f.camera, f.kind) for f in record.faults} == {
+        ("cam01", "black"),
+        ("cam02", "unreadable"),
+        ("cam03", "wrong-size"),
+    }
 
 
 def test_stale_pictures_never_reach_the_next_capture(bench: BenchMaker) -> None:
@@ -128,3 +176,14 @@ def test_random_bursts_with_random_faults_have_no_wrong_pair(bench: BenchMaker, 
             lost = sorted(script.drop | script.miss)
             assert record.missing.get(camera, []) == lost
     assert verify_session(made.session.folder).whole
+
+
+@pytest.mark.parametrize(
+    ("level", "dtype", "black"),
+    [(8, np.uint8, True), (40, np.uint8, False), (800, np.uint16, True), (3000, np.uint16, False)],
+)
+def test_what_counts_as_black(level: int, dtype: type, black: bool) -> None:
+    """A dark frame's noise does, a face in poor light does not."""
+    noise = np.random.default_rng(3).normal(level, level / 8.0, (120, 160))
+    frame = Frame("SN", 0, FrameStatus.OK, pixels=noise.clip(0).astype(dtype))
+    assert look_at(frame).black == black

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 from collections.abc import Callable
 from dataclasses import replace
@@ -20,7 +21,9 @@ from PIL.ExifTags import IFD, Base
 
 from geometry.errors import InputError
 from rig.cameras.base import Frame, FrameStatus
+from rig.capture import places
 from rig.capture.exif import PictureFacts, with_exif
+from rig.capture.faults import HARMLESS, FaultKind
 from rig.capture.pictures import filed
 from rig.capture.tables import tables
 from rig.capture.verify import FindingKind, verify_session
@@ -364,3 +367,13 @@ def test_colmap_groups_the_pictures_of_one_instant(designed: Bench, tmp_path: Pa
         assert database.num_images() == 2 * len(configs[0].cameras)
         assert database.num_rigs() == 1
         assert database.num_frames() == 2, "one frame for each instant"
+
+
+def test_the_page_names_every_fault_and_place() -> None:
+    text = (Path(__file__).resolve().parents[3] / "docs/capture.md").read_text(encoding="utf-8")
+    rows = dict(re.findall(r"\| `([a-z-]+)` \| [^|]+\|( yes)? ?\|", text))
+    for kind in FaultKind:
+        assert kind.value in rows, f"docs/capture.md does not tell {kind.value}"
+        assert bool(rows[kind.value]) == (kind in HARMLESS)
+    for place in (*places.TABLES, places.SESSION, places.INCOMPLETE, places.INTERRUPTED):
+        assert place in text

@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from geometry.errors import InputError, TooLargeError
+from rig.capture.rigfacts import read_rig_design
 from rig.station.examples import example_station_text
 from rig.station.pulses import arm_request, station_pulses
 from rig.station.spec import ImageFormat, Interlock, Station
@@ -135,6 +136,11 @@ REFUSED = [
     ({"capture": {"image_format": "gif"}}, "capture.image_format", "'jpeg', 'png' or 'tiff'"),
     ({"capture": {"frame_deadline_s": 0.0}}, "capture.frame_deadline_s", "greater than 0"),
     ({"trigger": {"url": "x", "backend": "arduino"}}, "trigger.backend", "'rigwright' or 'esper'"),
+    (
+        {"trigger": {"url": "x", "backend": "esper", "lead_us": 5.0}},
+        "trigger",
+        "leave lead_us away",
+    ),
     ({"trigger": None}, "trigger", ""),
     ({"camera": []}, "camera", "at least 1"),
     ({"schema": "rigwright.rig/1"}, "schema", "rigwright.station/1"),
@@ -173,6 +179,12 @@ def test_two_things_cannot_be_one(key: str, value: object, problem: str) -> None
     assert problem in str(error.value)
 
 
+def test_an_esper_box_starts_with_fire() -> None:
+    for backend, lead_us in (("esper", 0.0), ("rigwright", 2000.0)):
+        station = station_from_mapping({**data(), "trigger": {"url": "x", "backend": backend}})
+        assert station.trigger is not None and station.trigger.lead_us == lead_us
+
+
 def test_what_is_no_station_file(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="is not a station file"):
         parse_station("= nonsense")
@@ -193,6 +205,8 @@ def test_the_example_is_a_station() -> None:
     assert station.trigger is not None and station.trigger.url.startswith("fake:")
     assert {camera.backend for camera in station.cameras} == {"simulated"}
     assert station.simulation is not None and station.board is not None
+    design = read_rig_design(station)
+    assert set(design.cameras) == {camera.name for camera in station.cameras}
 
 
 KEYS = st.sampled_from(["name", "camera", "trigger", "capture", "led", "strobe", "schema", "x"])
