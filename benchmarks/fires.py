@@ -246,8 +246,11 @@ def table(tally: Tally, seconds: float) -> str:
 def write_table(path: Path, text: str) -> None:
     """Replace what stands between the marks in a page."""
     page = path.read_text(encoding="utf-8")
-    marked = re.compile(r"(<!-- fires -->\n).*?(\n<!-- end -->)", re.DOTALL)
-    path.write_text(marked.sub(lambda found: found[1] + text + found[2], page), encoding="utf-8")
+    marked = re.compile(r"(<!-- fires -->\n).*?(<!-- end -->)", re.DOTALL)
+    page, found = marked.subn(lambda marks: f"{marks[1]}{text}\n{marks[2]}", page)
+    if not found:
+        raise SystemExit(f"{path} has no <!-- fires --> and <!-- end --> to write between")
+    path.write_text(page, encoding="utf-8")
 
 
 def main() -> int:

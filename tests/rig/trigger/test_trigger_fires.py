@@ -87,10 +87,14 @@ def test_the_judge_sees_what_is_wrong() -> None:
 
 def test_the_table_goes_between_its_marks(tmp_path: Path) -> None:
     page = tmp_path / "page.md"
-    page.write_text("before\n<!-- fires -->\nold\n<!-- end -->\nafter\n")
+    page.write_text("before\n<!-- fires -->\n<!-- end -->\nafter\n")
+    write_table(page, "old")
     write_table(page, table(Tally(fires=3, slowest_s=0.5), 1.0))
     text = page.read_text()
     assert "old" not in text
     assert "| fires | 3 in 1 s |" in text
     assert text.startswith("before\n<!-- fires -->\n| | |")
     assert text.endswith("\n<!-- end -->\nafter\n")
+    page.write_text("no marks")
+    with pytest.raises(SystemExit, match="to write between"):
+        write_table(page, "new")
