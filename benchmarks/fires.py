@@ -12,6 +12,7 @@ import multiprocessing
 import random
 import re
 import sys
+import tempfile
 import threading
 import time
 from collections import Counter
@@ -173,8 +174,11 @@ def fire_fake(fires: int, seed: int) -> Tally:
     settings = FakeSettings(serial_number=f"fake-{seed}", drift_ppm=(seed % 7 - 3) * 500.0)
     chance = random.Random(seed)  # noqa: S311 - not for secrets
     with (
+        tempfile.TemporaryDirectory() as folder,
         start_fake(settings) as fake,
-        FaultProxy(fake.url, PtyEndpoint(), script) as proxy,
+        # A stable name: a terminal that comes back may have another number, and the old number
+        # may by then be another box's.
+        FaultProxy(fake.url, PtyEndpoint(Path(folder) / "box"), script) as proxy,
     ):
         mishaps = [
             lambda: proxy.unplug(0.05),
@@ -189,6 +193,8 @@ def fire_fake(fires: int, seed: int) -> Tally:
                 struck = chance.random() < MISHAP_RATE
                 shooter.fire(chance.choice(mishaps) if struck else None)
                 shooter.tally.faults["mishap"] += struck
+                if len(shooter.asked) > 2 * fires + 50:
+                    raise RuntimeError(f"the box does not come back: {box.health().last_problem}")
         finally:
             box.close()
         fake.box.advance()

@@ -50,7 +50,10 @@ class Endpoint(Protocol):
 
 
 class PtyEndpoint:
-    """A pseudo-terminal; ``link`` is a stable symbolic link to it."""
+    """A pseudo-terminal; ``link`` is a stable symbolic link to it.
+
+    Without a link it may come back from :meth:`replug` under another name.
+    """
 
     def __init__(self, link: Path | None = None) -> None:
         self._link = link

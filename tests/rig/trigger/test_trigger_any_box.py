@@ -6,6 +6,7 @@ It uses the driver and the public line only; what the outputs did is counted out
 from __future__ import annotations
 
 import contextlib
+from pathlib import Path
 
 import pytest
 from trigger_boxes import AnyBox, opened, request_for, wait_until
@@ -145,13 +146,15 @@ def test_what_the_box_cannot_do_is_said_before_it_is_asked(box_under_test: AnyBo
 
 
 @pytest.mark.parametrize("lost", ["request", "reply"])
-def test_a_lost_fire_line_never_makes_two_pulses(box_under_test: AnyBox, lost: str) -> None:
+def test_a_lost_fire_line_never_makes_two_pulses(
+    box_under_test: AnyBox, lost: str, tmp_path: Path
+) -> None:
     incident = {
         "request": Incident("to_box", "drop", containing="FIRE"),
         "reply": Incident("to_host", "drop", containing="OK cap=a t0="),
     }[lost]
     script = ProxyScript(incidents=(incident,))
-    with _proxy(box_under_test, script) as proxy, opened(proxy.url) as driver:
+    with _proxy(box_under_test, script, tmp_path) as proxy, opened(proxy.url) as driver:
         driver.arm(request_for("a"))
         driver.fire("a")
         report = driver.wait_done("a", 2.0)
@@ -161,10 +164,10 @@ def test_a_lost_fire_line_never_makes_two_pulses(box_under_test: AnyBox, lost: s
     assert box_under_test.rises() == {1: 1, 2: 1, 13: 1}
 
 
-def test_unplugged_between_fire_and_its_answer(box_under_test: AnyBox) -> None:
+def test_unplugged_between_fire_and_its_answer(box_under_test: AnyBox, tmp_path: Path) -> None:
     incident = Incident("to_host", "unplug", containing="OK cap=a t0=", for_s=0.1)
     script = ProxyScript(incidents=(incident,))
-    with _proxy(box_under_test, script) as proxy, opened(proxy.url) as driver:
+    with _proxy(box_under_test, script, tmp_path) as proxy, opened(proxy.url) as driver:
         driver.arm(request_for("a"))
         with pytest.raises(DeviceError, match="cannot be reached"):
             driver.fire("a")
@@ -175,10 +178,10 @@ def test_unplugged_between_fire_and_its_answer(box_under_test: AnyBox) -> None:
     assert box_under_test.rises() == {1: 1, 2: 1, 13: 1}
 
 
-def test_some_fires_through_a_bad_line(box_under_test: AnyBox) -> None:
+def test_some_fires_through_a_bad_line(box_under_test: AnyBox, tmp_path: Path) -> None:
     script = ProxyScript(FaultRates.all_at(0.05), FaultRates.all_at(0.05), seed=5)
     outcomes = []
-    with _proxy(box_under_test, script) as proxy, opened(proxy.url) as driver:
+    with _proxy(box_under_test, script, tmp_path) as proxy, opened(proxy.url) as driver:
         for number in range(8):
             try:
                 driver.arm(request_for(f"a{number}"))
@@ -193,8 +196,8 @@ def test_some_fires_through_a_bad_line(box_under_test: AnyBox) -> None:
     assert fired <= box_under_test.rises()[1] <= len(outcomes)
 
 
-def _proxy(box: AnyBox, script: ProxyScript) -> FaultProxy:
-    return FaultProxy(box.url, PtyEndpoint(), script, box.reset)
+def _proxy(box: AnyBox, script: ProxyScript, folder: Path) -> FaultProxy:
+    return FaultProxy(box.url, PtyEndpoint(folder / "port"), script, box.reset)
 
 
 def test_opening_twice_is_one_opening(box_under_test: AnyBox) -> None:
