@@ -121,7 +121,7 @@ def test_a_disk_that_fails_at_any_step_is_named(
     made.rig.capture(made.session, "one")
     master = made.session.folder
     passed = 0
-    for step in range(0, steps, 5 if number != errno.ENOSPC else 1):
+    for step in range(0, steps, 5 if number != errno.ENOSPC else 3):
         made.session.close()
         folder = master.with_name(f"full{number}-{step}")
         shutil.copytree(master, folder)
