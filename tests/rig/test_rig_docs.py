@@ -9,6 +9,7 @@ from pathlib import Path
 import jsonschema
 import pytest
 
+from rig.catalogue.model import CatalogueFile
 from rig.designfile import design_document
 from rig.designmodel import DesignFile
 from rig.examples import example_rig, example_text
@@ -23,16 +24,20 @@ def test_generated_documents_are_up_to_date(repo: Path) -> None:
 
 
 def test_the_command_writes_them(repo: Path, tmp_path: Path) -> None:
-    for name in ("rig-file.md", "design-file.md"):
+    for name in ("rig-file.md", "design-file.md", "catalogue.md"):
         text = (repo / "docs" / name).read_text(encoding="utf-8")
         (tmp_path / name).write_text(text.replace("| `seed` |", "| `sead` |"), encoding="utf-8")
     main(tmp_path)
-    for name in ("rig-file.md", "design-file.md", "rig.schema.json", "design.schema.json"):
+    for name in (
+        *("rig-file.md", "design-file.md", "catalogue.md"),
+        *("rig.schema.json", "design.schema.json", "catalogue.schema.json"),
+    ):
         assert (tmp_path / name).read_text() == (repo / "docs" / name).read_text()
 
 
 @pytest.mark.parametrize(
-    ("document", "model"), [("rig-file.md", RigFile), ("design-file.md", DesignFile)]
+    ("document", "model"),
+    [("rig-file.md", RigFile), ("design-file.md", DesignFile), ("catalogue.md", CatalogueFile)],
 )
 def test_every_key_is_documented(repo: Path, document: str, model: type) -> None:
     text = (repo / "docs" / document).read_text(encoding="utf-8")
@@ -66,7 +71,9 @@ def test_the_rig_file_in_the_document_is_a_rig_file(repo: Path) -> None:
     text = (repo / "docs/rig-file.md").read_text(encoding="utf-8")
     first = text.split("```toml\n")[1].split("```")[0]
     assert parse_rig(first).count == 7
-    zones = text.split("```toml\n")[2].split("```")[0]
+    parts = text.split("```toml\n")[2].split("```")[0]
+    assert parse_rig(f'schema = "rigwright.rig/1"\n{parts}').camera.f_number == 16.0
+    zones = text.split("```toml\n")[3].split("```")[0]
     # The zones of the document, put into the example in place of its own.
     before, _, after = example_text("face").partition("[limits.zones]")
     rest = after.partition("[limits.motion]")[2]
