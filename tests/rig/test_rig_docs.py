@@ -9,6 +9,7 @@ from pathlib import Path
 import jsonschema
 import pytest
 
+from rig.catalogue.model import CatalogueFile
 from rig.designfile import design_document
 from rig.designmodel import DesignFile
 from rig.examples import example_rig, example_text
@@ -24,7 +25,7 @@ def test_generated_documents_are_up_to_date(repo: Path) -> None:
 
 
 def test_the_command_writes_them(repo: Path, tmp_path: Path) -> None:
-    for name in ("rig-file.md", "design-file.md", "station-file.md"):
+    for name in ("rig-file.md", "design-file.md", "station-file.md", "catalogue.md"):
         text = (repo / "docs" / name).read_text(encoding="utf-8")
         (tmp_path / name).write_text(text.replace("| `seed` |", "| `sead` |"), encoding="utf-8")
     main(tmp_path)
@@ -34,7 +35,12 @@ def test_the_command_writes_them(repo: Path, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("document", "model"),
-    [("rig-file.md", RigFile), ("design-file.md", DesignFile), ("station-file.md", StationFile)],
+    [
+        ("rig-file.md", RigFile),
+        ("design-file.md", DesignFile),
+        ("station-file.md", StationFile),
+        ("catalogue.md", CatalogueFile),
+    ],
 )
 def test_every_key_is_documented(repo: Path, document: str, model: type) -> None:
     text = (repo / "docs" / document).read_text(encoding="utf-8")
@@ -68,7 +74,9 @@ def test_the_rig_file_in_the_document_is_a_rig_file(repo: Path) -> None:
     text = (repo / "docs/rig-file.md").read_text(encoding="utf-8")
     first = text.split("```toml\n")[1].split("```")[0]
     assert parse_rig(first).count == 7
-    zones = text.split("```toml\n")[2].split("```")[0]
+    parts = text.split("```toml\n")[2].split("```")[0]
+    assert parse_rig(f'schema = "rigwright.rig/1"\n{parts}').camera.f_number == 16.0
+    zones = text.split("```toml\n")[3].split("```")[0]
     # The zones of the document, put into the example in place of its own.
     before, _, after = example_text("face").partition("[limits.zones]")
     rest = after.partition("[limits.motion]")[2]
