@@ -18,10 +18,10 @@ from typing import Any
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from rig.capture.records import CaptureRecord, SessionFile
 from rig.catalogue.model import CatalogueFile
 from rig.designmodel import DesignFile
 from rig.rigfile import RigFile
+from rig.session.records import CaptureRecord, SessionFile
 from rig.station.stationfile import StationFile
 from rig.strict import child_model, key_of
 

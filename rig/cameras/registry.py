@@ -12,7 +12,7 @@ from geometry.errors import InputError, RigwrightError
 from rig.cameras.base import CameraBackend, CameraInfo
 
 BACKENDS: Mapping[str, str] = {
-    "simulated": "rig.cameras.simulated:SimulatedBackend",
+    "simulated": "rig.simulation.backend:SimulatedBackend",
     "folder": "rig.cameras.folder:FolderBackend",
     "opencv": "rig.cameras.opencv:OpencvBackend",
     "genicam": "rig.cameras.genicam:GenicamBackend",

@@ -1,4 +1,4 @@
-"""A capture from start to commit: arm, fire, collect, pair, prove, write.
+"""A station in operation: devices opened, armed, fired, and their pictures collected.
 
-:func:`rig.capture.rig.open_station` is the way in; ``docs/capture.md`` tells the whole.
+:mod:`rig.synchrony` judges what came, :mod:`rig.session` files it.
 """

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 from geometry.errors import DeviceError
 from rig.cameras.base import CameraDevice, ClockSample, Frame, TimestampKind, TriggerKind
-from rig.capture.instants import Bracket
-from rig.capture.looks import is_raw
+from rig.synchrony.instants import Bracket
+from rig.synchrony.looks import is_raw
 
 CLOCK_READINGS = 8
 SLICE_S = 0.1

@@ -7,18 +7,18 @@ from dataclasses import replace
 
 from geometry.errors import DeviceError
 from rig.cameras.base import CameraCapabilities, ClockSample, TriggerKind
-from rig.capture.clocks import ClockFitter, DeviceClock, Instant, clock_jumped
 from rig.capture.collect import Collected
-from rig.capture.faults import Fault, FaultKind
 from rig.capture.firing import Firing
 from rig.capture.hands import CameraHand
-from rig.capture.instants import command_instants, edge_instants
-from rig.capture.looks import is_raw, look_faults
-from rig.capture.pairing import pair
-from rig.capture.shooting import CameraPart, Shooting
-from rig.capture.swaps import swapped
-from rig.capture.take import Pairing, Take
 from rig.station.spec import CameraPlan, Station
+from rig.synchrony.clocks import ClockFitter, DeviceClock, Instant, clock_jumped
+from rig.synchrony.faults import Fault, FaultKind
+from rig.synchrony.instants import command_instants, edge_instants
+from rig.synchrony.looks import is_raw, look_faults
+from rig.synchrony.pairing import pair
+from rig.synchrony.shooting import CameraPart, Shooting
+from rig.synchrony.swaps import swapped
+from rig.synchrony.take import Pairing, Take
 from rig.trigger.box import Outcome
 
 Sizes = Mapping[str, tuple[int, int]]

@@ -9,9 +9,9 @@ from enum import StrEnum
 
 from rig.cameras.base import CameraSettings, ClockSample
 from rig.capture.collect import Collected
-from rig.capture.faults import Fault
 from rig.capture.hands import CameraHand
-from rig.capture.instants import Bracket
+from rig.synchrony.faults import Fault
+from rig.synchrony.instants import Bracket
 from rig.trigger.box import ArmRequest, FireReport, Outcome
 
 

@@ -8,12 +8,12 @@ from pathlib import Path
 
 from geometry.errors import DeviceError, InputError
 from rig.cameras.base import CameraHealth
-from rig.capture.faults import Fault
-from rig.capture.lags import LagEstimate, estimate_lags, new_timings
-from rig.capture.records import CaptureRecord
-from rig.capture.verdict import Evidence
+from rig.session.records import CaptureRecord
 from rig.station.delays import Timing
 from rig.station.spec import Station
+from rig.synchrony.faults import Fault
+from rig.synchrony.lags import LagEstimate, estimate_lags, new_timings
+from rig.synchrony.verdict import Evidence
 from rig.trigger.box import TriggerHealth
 
 

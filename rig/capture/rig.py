@@ -11,16 +11,10 @@ from types import TracebackType
 from typing import Self
 
 from geometry.errors import ConflictError, InputError, RigwrightError
-from rig.capture.boards import station_board
-from rig.capture.clocks import ClockFitter, fit_clock
 from rig.capture.develop import develop
 from rig.capture.devices import DeviceMaker, StationDevices
-from rig.capture.faults import Fault
 from rig.capture.firing import Fate, Order
-from rig.capture.lags import with_new_timings
-from rig.capture.naming import EitherToken, box_name
 from rig.capture.opening import OpenCameras
-from rig.capture.records import CaptureRecord
 from rig.capture.results import CaptureResult, DryRun, RigHealth, SelfTest, SyncCheck, judged_lags
 from rig.capture.rigfacts import (
     focal_lengths_mm,
@@ -31,15 +25,21 @@ from rig.capture.rigfacts import (
 )
 from rig.capture.run import CaptureRun
 from rig.capture.selftest import self_test
-from rig.capture.sessionfolder import Session
-from rig.capture.shooting import Shooting
-from rig.capture.staging import Stage
-from rig.capture.storage import Disk
-from rig.capture.verdict import Board, Evidence, gather
+from rig.session.folder import Session
+from rig.session.naming import EitherToken, box_name
+from rig.session.records import CaptureRecord
+from rig.session.staging import Stage
+from rig.session.storage import Disk
 from rig.station.delays import Timing
 from rig.station.locks import DeviceLocks, device_names
 from rig.station.pulses import check_burst
 from rig.station.spec import Station
+from rig.synchrony.boards import station_board
+from rig.synchrony.clocks import ClockFitter, fit_clock
+from rig.synchrony.faults import Fault
+from rig.synchrony.lags import with_new_timings
+from rig.synchrony.shooting import Shooting
+from rig.synchrony.verdict import Board, Evidence, gather
 from rig.trigger.box import TriggerBox
 from solver.progress import (
     CancelToken,

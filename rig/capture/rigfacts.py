@@ -10,13 +10,13 @@ from pathlib import Path
 from geometry.camera import RigCamera
 from geometry.errors import ConflictError, InputError
 from rig.cameras.base import CameraInfo
-from rig.capture import places
-from rig.capture.colmap import rig_config
-from rig.capture.jsonfiles import json_bytes, plain
-from rig.capture.records import SessionFile
-from rig.capture.sessionfolder import SessionPlan
-from rig.capture.storage import sha256
 from rig.designfile import placed_camera, read_design
+from rig.session import places
+from rig.session.colmap import rig_config
+from rig.session.folder import SessionPlan
+from rig.session.jsonfiles import json_bytes, plain
+from rig.session.records import SessionFile
+from rig.session.storage import sha256
 from rig.station.spec import Station
 
 RIG_SCHEMA = "rigwright.session-rig/1"

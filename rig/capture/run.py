@@ -13,12 +13,12 @@ from functools import partial
 from geometry.errors import CancelledError, DeviceError, InterlockError, RigwrightError
 from rig.cameras.base import ArmSpec, CameraDevice, CameraSettings
 from rig.capture.collect import Collected, Want, collect, read_clock
-from rig.capture.faults import Fault, FaultKind
 from rig.capture.firing import FATES, Fate, Firing, Order, Ready
 from rig.capture.hands import CameraHand, do_all, outcomes
-from rig.capture.instants import Bracket
 from rig.station.pulses import arm_request
 from rig.station.spec import Interlock, Station
+from rig.synchrony.faults import Fault, FaultKind
+from rig.synchrony.instants import Bracket
 from rig.trigger.box import ArmRequest, FireReport, Outcome, TriggerBox
 from solver.progress import CancelToken, Progress, ProgressCallback
 

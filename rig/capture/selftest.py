@@ -9,7 +9,7 @@ from pathlib import Path
 from rig.cameras.base import ArmSpec, CameraDevice, CameraSettings
 from rig.capture.hands import CameraHand, outcomes
 from rig.capture.results import Check, SelfTest
-from rig.capture.storage import Disk
+from rig.session.storage import Disk
 from rig.station.spec import CameraPlan, Interlock, Station
 from rig.trigger.box import TriggerBox, TriggerState
 

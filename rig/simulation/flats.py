@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from geometry.arrays import Floats
 from geometry.camera import RigCamera
 from geometry.errors import InputError
-from rig.capture.timingboard import TimingBoard, aruco_dictionary
 from rig.simulation.heads import read_picture
 from rig.simulation.sampling import LINEAR_OF_SRGB, pyramid, sampled
 from rig.simulation.settings import PlaceSettings, TargetSettings
+from rig.timingboard.reading import TimingBoard, aruco_dictionary
 
 Singles = NDArray[np.float32]
 

@@ -13,8 +13,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from geometry.errors import InputError
-from rig.capture.timingboard import TimingBoard
 from rig.simulation.faults import CameraFaults
+from rig.timingboard.reading import TimingBoard
 
 Triple = tuple[float, float, float]
 Quad = tuple[float, float, float, float]

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from geometry.camera import RigCamera
 from geometry.errors import NotFoundError
 from rig.cameras.base import Image
-from rig.capture.graytime import lit_shares
 from rig.simulation.defocus import defocused, softened
 from rig.simulation.flats import Flat, FlatView, target, timing_board
 from rig.simulation.heads import head_mesh
@@ -23,6 +22,7 @@ from rig.simulation.raytable import RayTables
 from rig.simulation.sensor import developed
 from rig.simulation.settings import SceneSettings, SensorSettings
 from rig.simulation.tracing import BackdropView, HeadModel, View
+from rig.timingboard.graytime import lit_shares
 
 Singles = NDArray[np.float32]
 

@@ -10,10 +10,10 @@ from fastapi.responses import FileResponse
 from pydantic import Field
 
 from geometry.errors import NotFoundError
-from rig.capture.records import CaptureRecord, SessionFile
-from rig.capture.recovery import read_books
-from rig.capture.storage import Disk
-from rig.capture.verify import verify_session
+from rig.session.records import CaptureRecord, SessionFile
+from rig.session.recovery import read_books
+from rig.session.storage import Disk
+from rig.session.verify import verify_session
 from service.api.context import ServiceDep
 from service.api.models import Model, problems
 

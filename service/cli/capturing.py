@@ -17,8 +17,8 @@ import typer
 from geometry.errors import InputError, NotFoundError
 from rig.capture.results import CaptureResult, SelfTest, SyncCheck
 from rig.capture.rig import Rig, open_station
-from rig.capture.sessionfolder import Session, session_folder
-from rig.capture.verify import verify_session
+from rig.session.folder import Session, session_folder
+from rig.session.verify import verify_session
 from rig.station.delays import write_timings
 from rig.station.stationfile import read_station
 from rig.trigger.box import TriggerHealth

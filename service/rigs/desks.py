@@ -7,7 +7,7 @@ from pathlib import Path
 
 from geometry.errors import ConflictError, InputError, NotFoundError, RigwrightError
 from rig.capture.results import CaptureResult
-from rig.capture.sessionfolder import Session
+from rig.session.folder import Session
 from rig.station.spec import Station
 from rig.station.stationfile import read_station
 from service.rigs.desk import Books, RigDesk

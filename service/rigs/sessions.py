@@ -6,7 +6,7 @@ from pathlib import Path
 
 from geometry.errors import NotFoundError
 from rig.capture.rig import Rig
-from rig.capture.sessionfolder import Session
+from rig.session.folder import Session
 
 
 class Sessions:

@@ -9,8 +9,8 @@ from pathlib import Path
 from memoryrig import BoxScript, CameraScript, MemoryBox, MemoryDevices, line_fit, memory_station
 
 from rig.capture.rig import Rig, open_station
-from rig.capture.sessionfolder import Session
-from rig.capture.storage import Disk
+from rig.session.folder import Session
+from rig.session.storage import Disk
 from rig.station.spec import Station
 
 

@@ -13,8 +13,8 @@ from memoryrig import CameraScript, memory_station, with_camera, with_policy
 from PIL import Image
 
 from rig.cameras.base import Frame, FrameStatus
-from rig.capture.looks import look_at
-from rig.capture.verify import verify_session
+from rig.session.verify import verify_session
+from rig.synchrony.looks import look_at
 
 SHOTS = 3
 BAD = frozenset({2})

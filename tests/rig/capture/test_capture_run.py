@@ -24,9 +24,9 @@ from memoryrig import (
 
 from geometry.errors import CancelledError, ConflictError, DeviceError, InputError, InterlockError
 from rig.cameras.base import TimestampKind, TriggerKind
-from rig.capture.naming import BOX_ID_LENGTH
 from rig.capture.rig import open_station
-from rig.capture.verify import verify_session
+from rig.session.naming import BOX_ID_LENGTH
+from rig.session.verify import verify_session
 from rig.station.spec import Interlock, TriggerPlan
 from solver.progress import Progress
 

@@ -15,14 +15,14 @@ from geometry.camera import RigCamera
 from geometry.errors import InputError
 from geometry.frames import Pose
 from rig.capture.rig import Rig, open_station
-from rig.capture.verify import verify_session
 from rig.designfile import placed_camera
 from rig.examples import example_rig
+from rig.session.verify import verify_session
 from rig.station.delays import write_timings
 from rig.station.simulation import simulation_settings
 from rig.station.stationfile import read_station
 
-pytest.importorskip("rig.cameras.simulated")
+pytest.importorskip("rig.simulation.backend")
 pytest.importorskip("rig.cameras.registry")
 pytest.importorskip("rig.trigger.driver")
 
