@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+import importlib.util
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +25,6 @@ _BAND_ROWS = 256
 _SHRINK = cv2.INTER_AREA
 
 
-@lru_cache(maxsize=2)
 def head_mesh(settings: HeadSettings) -> TexturedMesh:
     """The mesh of the head in the rig frame, not yet rounded.
 
@@ -49,6 +48,8 @@ def _scanned(settings: HeadSettings) -> TexturedMesh:
     path = Path(settings.scan or "")
     options = ScanOptions(units=settings.units, up=settings.up, front=settings.front)
     rig_from_file = read_scan(path, options).rig_from_file
+    if settings.texture is None:
+        _require_decoder()
     vertices, faces, uv, embedded = _textured(path)
     vertices = vertices @ rig_from_file[:3, :3].T + rig_from_file[:3, 3]
     vertices, faces, uv = _welded(vertices, faces, uv)
@@ -95,6 +96,16 @@ def _textured(path: Path) -> tuple[Floats, Ints, Floats, NDArray[np.uint8] | Non
     if not faces:
         raise InputError("simulation-scan", f"{path} has no mesh", "give a scan with faces")
     return np.concatenate(vertices), np.concatenate(faces), np.concatenate(uv), picture
+
+
+def _require_decoder() -> None:
+    """Without Pillow trimesh leaves pictures out in silence, and the head would be plain."""
+    if importlib.util.find_spec("PIL") is None:
+        raise InputError(
+            "simulation-texture",
+            "pictures inside a scan cannot be read: Pillow is not installed",
+            "run pip install pillow, or give the picture as texture",
+        )
 
 
 def _own_picture(part: Any) -> NDArray[np.uint8] | None:  # noqa: ANN401 - an untyped trimesh mesh

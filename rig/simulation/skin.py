@@ -6,6 +6,8 @@ backwards takes a plain corner of it. Hair is a tint of the vertices, so it need
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +32,7 @@ _BROW = (62, 44, 36)
 Picture = NDArray[np.uint8]
 
 
+@lru_cache(maxsize=1)
 def painted_head(seed: int = 0) -> TexturedMesh:
     """The average synthetic head with skin; ``seed`` varies relief, freckles and hairs."""
     shape = HeadShape()

@@ -13,7 +13,6 @@ from geometry.errors import NotFoundError
 from rig.cameras.base import Image
 from rig.simulation.defocus import defocused, softened
 from rig.simulation.flats import Flat, FlatView, target, timing_board
-from rig.simulation.heads import head_mesh
 from rig.simulation.imaging import sharp_image
 from rig.simulation.lighting import card_light
 from rig.simulation.mesh import TexturedMesh
@@ -71,7 +70,7 @@ class Studio:
     def head(self) -> HeadModel | None:
         """The head, None for a scene without; read and made ready on first use."""
         if self._head is None and self.scene.with_head:
-            self._head = HeadModel(head_mesh(self.scene.head), self.scene)
+            self._head = HeadModel(self.scene)
         return self._head
 
     @property

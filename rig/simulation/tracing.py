@@ -8,6 +8,7 @@ own length is the depth. Everything that does not change from picture to picture
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,11 +18,17 @@ from geometry.camera import RigCamera
 from geometry.raycast import Occluder
 from rig.simulation.flats import FlatView, bounds_px
 from rig.simulation.grain import grain
+from rig.simulation.heads import head_mesh
 from rig.simulation.lighting import openness, vertex_light
 from rig.simulation.mesh import TexturedMesh, subdivided
 from rig.simulation.motion import Placement
 from rig.simulation.sampling import LINEAR_OF_SRGB, sampled
-from rig.simulation.settings import BackdropSettings, SceneSettings
+from rig.simulation.settings import (
+    BackdropSettings,
+    HeadSettings,
+    LightSettings,
+    SceneSettings,
+)
 
 Singles = NDArray[np.float32]
 
@@ -36,12 +43,13 @@ _ENOUGH_VERTICES = 15_000
 class HeadModel:
     """The head at rest, ready for ray casting: acceleration structure, shadows, texture."""
 
-    def __init__(self, base: TexturedMesh, scene: SceneSettings) -> None:
+    def __init__(self, scene: SceneSettings) -> None:
         # Imported here: Embree takes memory that a scene without a head need not pay for.
         from embreex import rtcore_scene
         from embreex.mesh_construction import TriangleMesh
 
-        self.mesh = mesh = _rounded(base, scene)
+        # Grain and sheen are laid on later: heads that differ in them alone are one mesh.
+        self.mesh = mesh = _lit_mesh(replace(scene.head, grain_contrast=0, sheen=0), scene.lights)
         self.settings = scene.head
         self._scene = scene
         self._normals = mesh.normals
@@ -106,18 +114,20 @@ class HeadModel:
         return grain(points_mm, footprint_mm, self.settings.grain_contrast, self.settings.seed)
 
 
-def _rounded(base: TexturedMesh, scene: SceneSettings) -> TexturedMesh:
+@lru_cache(maxsize=2)
+def _lit_mesh(head: HeadSettings, lights: tuple[LightSettings, ...]) -> TexturedMesh:
     """The mesh rounded as asked, with what each vertex sees of the lights as its values.
 
     Shadows are soft, so they are cast on a mesh of some ten thousand vertices and halved along
     the edges from there: a full mesh would take ten times as long.
     """
+    base = head_mesh(head)
     before = 1 if len(base.vertices_mm) < _ENOUGH_VERTICES else 0
-    before = min(before, scene.head.subdivisions)
+    before = min(before, head.subdivisions)
     mesh = subdivided(base, before)
     occluder = Occluder(mesh.vertices_mm, mesh.faces)
-    values = openness(occluder, mesh.normals, scene.lights)
-    return subdivided(replace(mesh, values=values), scene.head.subdivisions - before)
+    values = openness(occluder, mesh.normals, lights)
+    return subdivided(replace(mesh, values=values), head.subdivisions - before)
 
 
 @dataclass(frozen=True, eq=False)

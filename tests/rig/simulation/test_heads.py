@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -101,12 +102,31 @@ def test_the_texture_is_on_its_side(ball: HeadSettings) -> None:
     del top
 
 
+def test_a_picture_inside_a_glb_is_used(ball: HeadSettings, tmp_path: Path) -> None:
+    import trimesh
+
+    Image = pytest.importorskip("PIL.Image")
+
+    flat = trimesh.load_mesh(ball.scan, process=False)
+    picture = Image.open(ball.texture)
+    material = trimesh.visual.material.PBRMaterial(baseColorTexture=picture)
+    flat.visual = trimesh.visual.TextureVisuals(uv=flat.visual.uv, material=material)
+    flat.export(tmp_path / "ball.glb")
+    within = replace(ball, scan=tmp_path / "ball.glb", texture=None)
+    mesh, beside = head_mesh(within), head_mesh(ball)
+    assert np.abs(mesh.picture.astype(int) - beside.picture).max() <= 1
+    # The same places of the picture on the same triangles, whatever order the file has them in.
+    assert np.allclose(
+        np.sort(mesh.texture_px.reshape(-1, 2), axis=0),
+        np.sort(beside.texture_px.reshape(-1, 2), axis=0),
+        atol=1e-3,
+    )
+
+
 def test_a_displacement_map_shows_as_light_and_dark(ball: HeadSettings, tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     bumps = rng.integers(100, 156, (256, 512), dtype=np.uint8)
     cv2.imwrite(str(tmp_path / "bumps.png"), bumps)
-    from dataclasses import replace
-
     rough = head_mesh(replace(ball, displacement=tmp_path / "bumps.png", detail_contrast=0.1))
     bright = rough.picture[40:, 320:, 0].astype(float)
     assert rough.picture.shape == (256, 512, 3)
@@ -115,8 +135,6 @@ def test_a_displacement_map_shows_as_light_and_dark(ball: HeadSettings, tmp_path
 
 
 def test_files_that_cannot_be_used_are_named(tmp_path: Path, ball: HeadSettings) -> None:
-    from dataclasses import replace
-
     with pytest.raises(NotFoundError, match="no-such"):
         head_mesh(replace(ball, texture=tmp_path / "no-such.png"))
     (tmp_path / "bad.png").write_bytes(b"not a picture")

@@ -20,6 +20,7 @@ from rig.simulation.backend import SimulatedBackend
 from rig.simulation.faults import CameraFaults
 from rig.simulation.settings import (
     BoardSettings,
+    LightSettings,
     PlaceSettings,
     SceneSettings,
     SensorSettings,
@@ -138,7 +139,9 @@ def test_a_burst_gives_its_frames_in_order_with_counters_and_times(backend_of: M
 
 def test_slow_rendering_makes_no_frame_late_and_loses_none(backend_of: Maker) -> None:
     """The caller's own clock has run out when the first picture is there; all are handed over."""
-    backend = backend_of(scene=SceneSettings())
+    # A light that no other test has, so that its shadows are still to be found.
+    light = LightSettings((123.0, -1000.0, 456.0), 1.0)
+    backend = backend_of(scene=SceneSettings(lights=(light,)))
     devices = [backend.open(name) for name in ("cam01", "cam02")]
     for device in devices:
         device.arm(ArmSpec("c", 2, DEADLINE_S))

@@ -34,18 +34,18 @@ def test_shares_are_those_of_the_counter_itself(bits: int, start: float, length:
     assert np.abs(found - lit.sum(axis=0) / length).max() < 1e-6
 
 
-@pytest.mark.parametrize("length", [0.1, 0.7, 2.3, 5.0, 10.0, 40.0, 80.0, 250.0])
+@pytest.mark.parametrize("length", [0.1, 0.7, 2.3, 10.0, 40.0, 250.0])
 @pytest.mark.parametrize("known", [False, True])
 def test_errors_are_as_large_as_stated(length: float, known: bool) -> None:
-    """40 random instants each: the errors are distributed as the standard deviations say."""
+    """25 random instants each: the errors are distributed as the standard deviations say."""
     rng = np.random.default_rng(int(10 * length))
     scaled = []
-    for _ in range(40):
+    for _ in range(25):
         middle, sigma = rng.uniform(0.0, 2.0**BITS), np.full(BITS, 0.005)
         shares = lit_shares(np.array(middle), np.array(length), BITS) + rng.normal(0.0, sigma)
         found = solve_interval(shares, sigma, 1.04 * length if known else None)
         scaled.append(difference(found.middle_ticks, middle) / found.middle_sigma_ticks)
-    # The rms of 40 unit normals is 1 +- 0.11; a stated exposure believed to 10 % may give less.
+    # The rms of 25 unit normals is 1 +- 0.14; a stated exposure believed to 10 % may give less.
     assert np.sqrt(np.mean(np.square(scaled))) < 1.5
     assert np.abs(scaled).max() < 5.0
 
