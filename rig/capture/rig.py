@@ -125,6 +125,12 @@ class Rig:
         if self.box is not None:
             self.box.abort()
 
+    def reset(self) -> None:
+        """Let the box leave its fault; :class:`InterlockError` while its interlock is open."""
+        with self._busy_with("a reset"):
+            if self.box is not None:
+                self.box.reset()
+
     def new_session(
         self, folder: Path, subject: str = "", operator: str = "", disk: Disk | None = None
     ) -> Session:

@@ -137,4 +137,5 @@ def _trigger(shooting: Shooting, evidence: Evidence) -> dict[str, object] | None
         "clock_uncertainty_us": report.clock_uncertainty_us,
         "error_us": None if evidence.edges is None else evidence.edges.error_us,
         "edges": report.edges,
+        "wire": report.wire,
     }

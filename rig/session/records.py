@@ -128,6 +128,14 @@ class EdgeEntry(StrictModel):
     late_us: float = Field(description="Later than programmed by this.")
 
 
+class WireEntry(StrictModel):
+    """One line that host and box said to each other."""
+
+    host_ns: int = Field(description="When, on the host's clock.")
+    sent: bool = Field(description="Whether the host said it.")
+    text: str = Field(description="The line as it stood.")
+
+
 class TriggerEntry(StrictModel):
     """What the box says: level A of the evidence."""
 
@@ -140,6 +148,7 @@ class TriggerEntry(StrictModel):
     clock_uncertainty_us: Number = Field(description="How well its clock is known on the host's.")
     error_us: Number = Field(description="Largest difference of an edge to what was programmed.")
     edges: list[EdgeEntry] = Field(description="Its log; empty for a box without one.")
+    wire: list[WireEntry] = Field(description="Every line from ARM to the last answer.")
 
 
 class ShotEntry(StrictModel):

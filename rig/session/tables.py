@@ -111,14 +111,16 @@ def _cell(value: object) -> object:
 
 
 def _trigger(record: CaptureRecord) -> bytes:
-    """One line per report, edge and clock reading."""
+    """One line per report, edge, line of the wire and clock reading."""
     head = {"capture_id": record.capture_id}
     lines: list[dict[str, object]] = []
     if record.trigger is not None:
-        report = record.trigger.model_dump(mode="json", exclude={"edges"})
+        report = record.trigger.model_dump(mode="json", exclude={"edges", "wire"})
         lines.append({**head, "kind": "report", **report})
         edges = (edge.model_dump(mode="json") for edge in record.trigger.edges)
         lines += [{**head, "kind": "edge", **edge} for edge in edges]
+        wire = (line.model_dump(mode="json") for line in record.trigger.wire)
+        lines += [{**head, "kind": "line", **line} for line in wire]
     keys = ("host_before_ns", "device_ns", "host_after_ns")
     for camera in record.cameras:
         clock = {**head, "kind": "clock", "camera": camera.name}

@@ -113,7 +113,7 @@ class StationCameraSection(StrictModel):
     )
     delay_us: Microseconds = Field(
         default=0.0,
-        description="From the shot's zero to the edge that fires it. `rigwright rig sync --write` "
+        description="From the shot's zero to the edge that fires it. `rigwright rig check --write` "
         "finds it.",
     )
     width_us: float = Field(default=1000.0, gt=0.0, le=1e9, description="Width of its pulse.")

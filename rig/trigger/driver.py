@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import os
 import threading
+import time
 from collections.abc import Callable
 from concurrent.futures import CancelledError as FutureCancelledError
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from geometry.errors import DeviceError
@@ -17,7 +18,7 @@ from rig.trigger.clock import ClockModel
 from rig.trigger.flight import known_report, stranger_report
 from rig.trigger.jobs import PATIENCE_S, JobQueue
 from rig.trigger.keeper import BoxView, Keeper
-from rig.trigger.metrics import Metrics, WireLog
+from rig.trigger.metrics import Metrics, WireLog, WireTape
 from rig.trigger.owner import PROBE_S, PortOwner
 from rig.trigger.program import compile_program
 from rig.trigger.serialline import SerialLine, bare_url, is_device_path
@@ -61,13 +62,15 @@ class SerialTriggerBox:
     def __init__(self, address: BoxAddress, wire_log: WireLog | None = None) -> None:
         self.address = address
         self._metrics = Metrics()
-        self._keeper = Keeper(address.serial_number, self._metrics, wire_log)
+        self._tape = WireTape(wire_log)
+        self._keeper = Keeper(address.serial_number, self._metrics, self._tape)
         self._keeper.clock = ClockModel(address.wire_ns())
         self._queue: JobQueue | None = None
         self._captures = Captures(self._keeper, self._aborting)
         self._owner: PortOwner | None = None
         self._listeners: list[Callable[[FireReport], None]] = []
         self._lock = threading.Lock()
+        self._armed_ns: dict[str, int] = {}
 
     @property
     def capabilities(self) -> TriggerCapabilities:
@@ -146,6 +149,7 @@ class SerialTriggerBox:
         if limits is None:
             raise _closed()
         program = compile_program(request, limits)
+        self._armed_ns = {request.capture_id: time.monotonic_ns()}
         self._order(lambda: self._captures.arm(program))
 
     def fire(self, capture_id: str) -> None:
@@ -174,6 +178,8 @@ class SerialTriggerBox:
             with self._captures.resolved:
                 self._captures.resolved.wait_for(lambda: not flight.open, timeout_s)
             report = flight.report or known_report(flight, self._keeper.view.problem)
+        if capture_id in self._armed_ns:
+            report = replace(report, wire=self._tape.since(self._armed_ns[capture_id]))
         for listener in list(self._listeners):
             listener(report)
         return report

@@ -17,7 +17,7 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from geometry.errors import ConflictError, DeviceError
 from rig.trigger.box import (
@@ -27,11 +27,12 @@ from rig.trigger.box import (
     TriggerCapabilities,
     TriggerHealth,
     TriggerState,
+    WireLine,
 )
 from rig.trigger.driver import BoxAddress
 from rig.trigger.esper_program import MAX_MS, OUTPUTS, EsperProgram, compile_esper
 from rig.trigger.lines import MAX_ANSWER, LineReader
-from rig.trigger.metrics import Metrics, WireLine, WireLog
+from rig.trigger.metrics import Metrics, WireLog, WireTape
 from rig.trigger.serialline import LineLostError, SerialLine
 
 TEN_FOUR = "tenFour"
@@ -77,7 +78,7 @@ class EsperTriggerBox:
     ) -> None:
         self.address = address
         self._half_press = half_press
-        self._wire_log = wire_log
+        self._tape = WireTape(wire_log)
         self._metrics = Metrics()
         self._reader = LineReader(MAX_ANSWER)
         self._line: SerialLine | None = None
@@ -177,6 +178,7 @@ class EsperTriggerBox:
             report = _report(capture_id, Outcome.UNKNOWN, "this driver has not armed it")
         else:
             report = shot.report or self._find_out(shot, deadline)
+            report = replace(report, wire=self._tape.since(shot.armed_ns))
         for listener in list(self._listeners):
             listener(report)
         return report
@@ -227,6 +229,10 @@ class EsperTriggerBox:
             self._order("F0")
             self._order("s" + "0" * OUTPUTS)
             self._state = TriggerState.READY
+
+    def reset(self) -> None:
+        """As :meth:`abort`: this box has no fault to leave."""
+        self.abort()
 
     def subscribe(self, listener: Callable[[FireReport], None]) -> Callable[[], None]:
         """Hear every report before :meth:`wait_done` returns it."""
@@ -331,8 +337,7 @@ class EsperTriggerBox:
             self._line = None
 
     def _log(self, text: str, *, sent: bool) -> None:
-        if self._wire_log is not None:
-            self._wire_log(WireLine(time.monotonic_ns(), sent, text))
+        self._tape(WireLine(time.monotonic_ns(), sent, text))
 
 
 def _report(capture_id: str, outcome: Outcome, why: str) -> FireReport:

@@ -7,8 +7,9 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+from rig.trigger.box import WireLine
 from rig.trigger.lines import MAX_ANSWER, ErrorCode, LineError, LineReader, RawLine
-from rig.trigger.metrics import Metrics, WireLine, WireLog
+from rig.trigger.metrics import Metrics, WireLog
 from rig.trigger.protocol import SEQUENCE_MODULUS, Event, Reply, Request, parse_answer
 from rig.trigger.serialline import SerialLine
 

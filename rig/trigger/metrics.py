@@ -5,22 +5,37 @@ from __future__ import annotations
 import statistics
 from collections import Counter, deque
 from collections.abc import Callable
-from dataclasses import dataclass
+
+from rig.trigger.box import WireLine
 
 _ROUND_TRIPS = 500
-
-
-@dataclass(frozen=True)
-class WireLine:
-    """One line as it went over the wire. ``host_ns`` is ``time.monotonic_ns``."""
-
-    host_ns: int
-    sent: bool
-    text: str
+_REMEMBERED_LINES = 4000
+"""A burst of the longest kind with its edge log read, and the heartbeat around it."""
 
 
 WireLog = Callable[[WireLine], None]
 """Hears every line, on the thread that owns the port: it must be quick and must not raise."""
+
+
+class WireTape:
+    """The last lines of a wire, for the report of the capture they belong to.
+
+    Written by the thread that owns the port; ``also`` hears every line too.
+    """
+
+    def __init__(self, also: WireLog | None = None) -> None:
+        self._also = also
+        self._lines: deque[WireLine] = deque(maxlen=_REMEMBERED_LINES)
+
+    def __call__(self, line: WireLine) -> None:
+        """Take note of a line."""
+        self._lines.append(line)
+        if self._also is not None:
+            self._also(line)
+
+    def since(self, host_ns: int) -> tuple[WireLine, ...]:
+        """The lines from an instant on."""
+        return tuple(line for line in tuple(self._lines) if line.host_ns >= host_ns)
 
 
 class Metrics:

@@ -50,6 +50,16 @@ def abort_rig(service: ServiceDep, rig: str) -> JSON:
     return _document(desk)
 
 
+@router.post(
+    "/v1/rigs/{rig}/reset", response_model=RigStatus, responses=problems(404, 409, 423, 503)
+)
+def reset_rig(service: ServiceDep, rig: str) -> JSON:
+    """Let the trigger box leave its fault: 423 while the interlock is open. Fires nothing."""
+    desk = service.rigs.get(rig)
+    desk.reset()
+    return _document(desk)
+
+
 def _document(desk: RigDesk) -> JSON:
     health, problem, doing = desk.health()
     own = rig_path(desk.name)
@@ -68,7 +78,7 @@ def _document(desk: RigDesk) -> JSON:
             "cameras": cameras,
             "links": {
                 "self": own,
-                **{word: f"{own}/{word}" for word in ("captures", "tests", "abort")},
+                **{word: f"{own}/{word}" for word in ("captures", "tests", "abort", "reset")},
             },
         }
     )

@@ -6,7 +6,8 @@ import dataclasses
 import json
 import secrets
 import sys
-from contextlib import ExitStack
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -21,7 +22,7 @@ from rig.session.folder import Session, session_folder
 from rig.session.verify import verify_session
 from rig.station.delays import write_timings
 from rig.station.stationfile import read_station
-from rig.trigger.box import TriggerHealth
+from rig.trigger.box import TriggerBox, TriggerCapabilities, TriggerHealth
 from service.cli.progress import show_progress
 from service.cli.running import cancel_on_signal, one_line_errors
 from service.problems import KINDS
@@ -136,26 +137,59 @@ def run_rig_check_command(station: Path, captures: int, *, write: bool, as_json:
 def run_trigger_selftest_command(url: str | None, station: Path | None, *, as_json: bool) -> None:
     """Open a box and tell how it is."""
     with one_line_errors():
-        from rig.capture.devices import StationDevices
-        from rig.station.spec import TriggerPlan
-
-        if (url is None) == (station is None):
-            raise InputError("box", "no box, or two, were named", "give --url or --station")
-        plan = TriggerPlan("rigwright", url) if url else None
-        plan = plan or read_station(station or Path()).trigger
-        if plan is None:
-            raise InputError("box", "the station has no trigger box", "add [trigger] to its file")
-        with ExitStack() as stack:
-            devices = StationDevices()
-            stack.callback(devices.close)
-            box = devices.make_box(plan)
-            stack.callback(box.close)
-            box.open()
+        with _open_box(url, station) as box:
             health, capabilities = box.health(), box.capabilities
-        document = {"health": health, "capabilities": capabilities, "ok": _box_well(health)}
-        _show(plain(document), as_json=as_json)
+        document = {"ok": _box_well(health), "health": health, "capabilities": capabilities}
+        if as_json:
+            _print_json(document)
+        else:
+            _print_box(health, capabilities)
     if not _box_well(health):
         raise typer.Exit(NOT_WELL)
+
+
+def run_trigger_reset_command(url: str | None, station: Path | None) -> None:
+    """Let a box leave its fault."""
+    with one_line_errors(), _open_box(url, station) as box:
+        box.reset()
+        sys.stdout.write(f"the box is {box.health().state}\n")
+
+
+@contextmanager
+def _open_box(url: str | None, station: Path | None) -> Iterator[TriggerBox]:
+    from rig.capture.devices import StationDevices
+    from rig.station.spec import TriggerPlan
+
+    if (url is None) == (station is None):
+        raise InputError("box", "no box, or two, were named", "give --url or --station")
+    plan = TriggerPlan("rigwright", url) if url else read_station(station or Path()).trigger
+    if plan is None:
+        raise InputError("box", "the station has no trigger box", "add [trigger] to its file")
+    with ExitStack() as stack:
+        devices = StationDevices()
+        stack.callback(devices.close)
+        box = devices.make_box(plan)
+        stack.callback(box.close)
+        box.open()
+        yield box
+
+
+def _print_box(health: TriggerHealth, can: TriggerCapabilities) -> None:
+    interlock = {True: "closed", False: "OPEN", None: "none"}[health.interlock_closed]
+    lines = [
+        f"{health.identity}, serial number {health.serial_number}, firmware {health.firmware}",
+        f"state: {health.state}; interlock: {interlock}; started {health.boots} times",
+        f"{can.outputs} outputs, steps of {can.tick_us:g} us, delays up to "
+        f"{can.max_delay_us / 1e6:g} s, pulses up to {can.max_width_us / 1e6:g} s, "
+        f"bursts of up to {can.max_shots}",
+    ]
+    if health.round_trip_p50_ms is not None:
+        lines.append(f"round trip: {health.round_trip_p50_ms:.2f} ms median")
+    if health.clock_residual_us is not None:
+        lines.append(f"its clock is known to {health.clock_residual_us:.0f} us")
+    if health.last_problem:
+        lines.append(f"last problem: {health.last_problem}")
+    sys.stdout.write("".join(line + "\n" for line in lines))
 
 
 def _box_well(health: TriggerHealth) -> bool:

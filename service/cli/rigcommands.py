@@ -133,6 +133,33 @@ def trigger_selftest(
     run_trigger_selftest_command(url, station, as_json=as_json)
 
 
+@trigger.command("reset")
+def trigger_reset(
+    url: Annotated[
+        str | None,
+        typer.Option(
+            help="Serial port or pySerial address of a Rigwright box.", show_default=False
+        ),
+    ] = None,
+    station: Annotated[
+        Path | None,
+        typer.Option(
+            "--station",
+            metavar="STATION.toml",
+            help="The station whose box to reset.",
+            show_default=False,
+        ),
+    ] = None,
+) -> None:
+    """Let a box leave its fault, once its interlock is closed again. Fires nothing.
+
+    Example:  rigwright trigger reset --url /dev/ttyACM0
+    """
+    from service.cli.capturing import run_trigger_reset_command
+
+    run_trigger_reset_command(url, station)
+
+
 @sessions.command("verify")
 def sessions_verify(
     folder: Annotated[

@@ -102,6 +102,17 @@ class RigDesk:
                 with suppress(ConflictError):
                     self._books.cancels.cancel(doing.id, doing.kind)
 
+    def reset(self) -> None:
+        """Let the box leave its fault.
+
+        Raises :class:`InterlockError` while its interlock is open, :class:`ConflictError` while
+        the rig is busy.
+        """
+        rig = self._rig
+        if rig is None:
+            raise self._not_open()
+        rig.reset()
+
     def begin(self, new: NewJob, job_id: str, work: Work) -> tuple[JobRecord, bool]:
         """Begin a job, and whether it is new; the same request again gives the job there is.
 

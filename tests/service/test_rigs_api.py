@@ -96,6 +96,8 @@ class TestCaptures:
         record = job["result"]["record"]
         assert (record["state"], job["result"]["session"]) == ("complete", "anna-1")
         assert record["verdict"]["state"] == "synchronised"
+        said = [line["text"] for line in record["trigger"]["wire"] if line["sent"]]
+        assert sum(" FIRE cap=" in text for text in said) == 1
         for frame in record["frames"]:
             path = f"/v1/sessions/anna-1/files/{frame['file']['path']}"
             picture = rig.get(path)
@@ -163,6 +165,22 @@ class TestDevicesThatAreNotWell:
         assert problem_of(refused) == (423, "/problems/interlock/open")
         assert rig.get("/v1/rigs/studio").json()["status"] == "degraded"
         assert pulses(box) == 0
+
+    def test_an_interlock_that_opens_in_a_burst_stops_it_until_a_reset(
+        self, rig: TestClient, box: FakeTrigger
+    ) -> None:
+        job = ask(rig, shots=50, interval_us=2e5)
+        wait_for(lambda: pulses(box) >= 2)
+        box.box.set_interlock(False)
+        box.server.wake()
+        assert end(rig, job)["status"] == "failed"
+        assert pulses(box) < 50
+        assert problem_of(rig.post("/v1/rigs/studio/reset")) == (423, "/problems/interlock/open")
+        box.box.set_interlock(True)
+        box.server.wake()
+        wait_for(lambda: rig.get("/v1/rigs/studio").json()["trigger"]["state"] == "fault")
+        assert rig.post("/v1/rigs/studio/reset").json()["trigger"]["state"] == "ready"
+        assert end(rig, ask(rig, capture_id="two"))["status"] == "completed"
 
     def test_a_box_that_is_gone_is_503(self, rig: TestClient, box: FakeTrigger) -> None:
         box.close()

@@ -168,6 +168,9 @@ class MemoryBox:
         self.armed = None
         self._aborted.set()
 
+    def reset(self) -> None:
+        self.abort()
+
     def subscribe(self, listener: Callable[[FireReport], None]) -> Callable[[], None]:
         self._listeners.append(listener)
         return lambda: self._listeners.remove(listener)

@@ -20,6 +20,9 @@ from rig.trigger.protocol import (
 
 MIN_LEAD = 2000
 MIN_PAUSE = 2000
+MAX_PAD = 60
+NUMBERS = frozenset({"ch", "d", "i", "iv", "k", "lead", "n", "ttl", "w"})
+"""Keys whose values are decimal numbers."""
 
 Fields = Mapping[str, str]
 
@@ -78,15 +81,24 @@ def _answer_request(box: FakeBox, request: ReceivedRequest, received_ticks: int)
 
 
 def _do(box: FakeBox, request: ReceivedRequest, received_ticks: int) -> Fields:
+    _check_kinds(request.fields)
     if request.command == "TIME?":
+        if len(request.fields.get("pad", "")) > MAX_PAD:
+            raise Refusal(ErrorCode.RANGE, key="pad")
         rx = instant_text(received_ticks)
         return {"rx": rx, "tx": instant_text(box.ticks())}
     return _HANDLERS[request.command](box, request.fields)
 
 
+def _check_kinds(fields: Fields) -> None:
+    """Whether each value is of its kind, before any is held against a limit."""
+    for key, value in fields.items():
+        pattern = "x+" if key == "pad" else "[0-9]+" if key in NUMBERS else ".*"
+        if not re.fullmatch(pattern, value):
+            raise Refusal(ErrorCode.TYPE)
+
+
 def _number(fields: Fields, key: str, low: int, high: int) -> int:
-    if not re.fullmatch(r"[0-9]+", fields[key]):
-        raise Refusal(ErrorCode.TYPE)
     value = int(fields[key])
     if not low <= value <= high:
         raise Refusal(ErrorCode.RANGE, key=key)
