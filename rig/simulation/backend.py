@@ -96,6 +96,7 @@ class SimulatedBackend:
                     device,
                 )
                 self._devices[camera_id] = device
+            self._pool.begin()
             return device
 
     def expose(self, report: FireReport) -> None:

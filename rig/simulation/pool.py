@@ -53,6 +53,15 @@ class RenderPool:
                 return self._executor.submit(self._studio.photograph, shot)
             return self._executor.submit(_photograph, shot)
 
+    def begin(self) -> None:
+        """Let the processes start in the background, so that the first shot need not wait."""
+        with self._lock:
+            if self._closed or self._workers == 0 or self._executor is not None:
+                return
+            self._executor = self._started()
+            for _ in range(self._workers):
+                self._executor.submit(_nothing)
+
     def warm_up(self) -> None:
         """Start the processes and build their studios now rather than at the first shot."""
         first = self._parts[0][0]
@@ -106,6 +115,10 @@ def _end_with_parent() -> None:
     if parent is not None:
         connection.wait([parent.sentinel])
         os._exit(1)
+
+
+def _nothing() -> None:
+    """What makes a process start."""
 
 
 def _photograph(shot: Shot) -> Image:

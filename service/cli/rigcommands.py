@@ -128,7 +128,7 @@ def trigger_selftest(
 
     Example:  rigwright trigger selftest --url /dev/ttyACM0
     """
-    from service.cli.capturing import run_trigger_selftest_command
+    from service.cli.boxes import run_trigger_selftest_command
 
     run_trigger_selftest_command(url, station, as_json=as_json)
 
@@ -155,7 +155,7 @@ def trigger_reset(
 
     Example:  rigwright trigger reset --url /dev/ttyACM0
     """
-    from service.cli.capturing import run_trigger_reset_command
+    from service.cli.boxes import run_trigger_reset_command
 
     run_trigger_reset_command(url, station)
 
@@ -173,7 +173,7 @@ def sessions_verify(
 
     Example:  rigwright sessions verify sessions/sub-anna/ses-20261122T093000
     """
-    from service.cli.capturing import run_sessions_verify_command
+    from service.cli.filing import run_sessions_verify_command
 
     run_sessions_verify_command(folder, as_json=as_json)
 
@@ -188,7 +188,7 @@ def sessions_recover(
 
     Example:  rigwright sessions recover sessions/sub-anna/ses-20261122T093000
     """
-    from service.cli.capturing import run_sessions_recover_command
+    from service.cli.filing import run_sessions_recover_command
 
     run_sessions_recover_command(folder)
 
@@ -198,7 +198,7 @@ def cameras(as_json: JsonOption = False) -> None:
 
     Example:  rigwright cameras
     """
-    from service.cli.capturing import run_cameras_command
+    from service.cli.filing import run_cameras_command
 
     run_cameras_command(as_json=as_json)
 
@@ -232,6 +232,6 @@ def fake_trigger(
 
     Example:  rigwright fake-trigger --link box
     """
-    from service.cli.capturing import run_fake_trigger_command
+    from service.cli.boxes import run_fake_trigger_command
 
     run_fake_trigger_command(link, port, serial_number, seed, faults, drift_ppm)
