@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -116,6 +117,16 @@ class TestCaptures:
         assert (again.status_code, again.json()) == (200, first)
         other = rig.post("/v1/rigs/studio/captures", json={"capture_id": "one", "shots": 2})
         assert problem_of(other) == (409, "/problems/conflict/id-used")
+        assert pulses(box) == 1
+
+    def test_many_clients_at_once_fire_once(self, rig: TestClient, box: FakeTrigger) -> None:
+        def post(_: int) -> int:
+            return rig.post("/v1/rigs/studio/captures", json={"capture_id": "one"}).status_code
+
+        with ThreadPoolExecutor(8) as pool:
+            statuses = sorted(pool.map(post, range(8)))
+        assert statuses == [200] * 7 + [201]
+        assert end(rig, rig.get("/v1/captures/one").json())["status"] == "completed"
         assert pulses(box) == 1
 
     def test_a_second_one_meanwhile_is_refused_and_told_why(self, rig: TestClient) -> None:
