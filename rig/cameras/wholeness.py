@@ -39,8 +39,8 @@ def is_whole(path: Path) -> bool:
     """Whether the file has everything its own header promises.
 
     JPEG to its end mark, PNG to its last chunk, TIFF and the raw formats built on it to the last
-    strip, HEIC and CR3 to the last box. Of Fuji's RAF only the beginning is looked at. False for
-    a file that cannot be read or is not what its suffix says.
+    strip, HEIC and CR3 to the last box, Fuji's RAF to the end of its three parts. False for a
+    file that cannot be read or is not what its suffix says.
     """
     suffix = path.suffix.lower()
     try:
@@ -53,7 +53,7 @@ def is_whole(path: Path) -> bool:
             if suffix in (".cr3", ".heic"):
                 return _boxes(file, size)
             if suffix == ".raf":
-                return file.read(16) == b"FUJIFILMCCD-RAW "
+                return _raf(file, size)
             return _tiff(file, size)
     except (OSError, struct.error, ValueError):
         return False
@@ -61,6 +61,20 @@ def is_whole(path: Path) -> bool:
 
 def _read(file: BinaryIO, form: str) -> tuple[int, ...]:
     return struct.unpack(form, file.read(struct.calcsize(form)))
+
+
+def _raf(file: BinaryIO, size: int) -> bool:
+    """Whether the three parts that Fuji's header names lie within the file.
+
+    At byte 84 stand offset and length of the JPEG preview, of the raw picture's own header and of
+    the raw picture, in big-endian numbers.
+    """
+    if file.read(16) != b"FUJIFILMCCD-RAW ":
+        return False
+    file.seek(84)
+    places = _read(file, ">6I")
+    parts = list(zip(places[::2], places[1::2], strict=True))
+    return all(start >= 108 and start + length <= size for start, length in parts)
 
 
 def _jpeg(file: BinaryIO) -> bool:

@@ -49,6 +49,12 @@ def boxes() -> bytes:
     return box(b"ftyp", b"crx isom") + box(b"moov", b"x" * 30) + box(b"mdat", b"y" * 50)
 
 
+def fuji() -> bytes:
+    """A header that names three parts, and the parts."""
+    header = b"FUJIFILMCCD-RAW ".ljust(84, b"\0") + struct.pack(">6I", 108, 20, 128, 12, 140, 50)
+    return header + b"p" * 20 + b"h" * 12 + b"r" * 50
+
+
 FILES = {
     "plain.jpg": encoded(".jpg"),
     "exif.JPG": jpeg("4711"),
@@ -57,6 +63,7 @@ FILES = {
     "a.tif": encoded(".tiff"),
     "a.nef": big_endian_raw(),
     "a.cr3": boxes(),
+    "a.raf": fuji(),
 }
 
 
