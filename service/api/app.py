@@ -10,14 +10,24 @@ from anyio import to_thread
 from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 
-from service.api import captures, designs, evaluations, rigs, rigtests, root, scans, sessions
+from service.api import (
+    captures,
+    designs,
+    evaluations,
+    exports,
+    rigs,
+    rigtests,
+    root,
+    scans,
+    sessions,
+)
 from service.api.context import Service
 from service.api.errors import install_error_handlers
 from service.api.middleware import JsonLimit, RequestLog
 from service.api.models import Problem
 
 _DESCRIPTION = (
-    "Designs multi-camera rigs that photograph a face. Lengths are in millimetres, angles in "
+    "Designs and runs multi-camera rigs that photograph a face. Lengths are in millimetres, angles in "
     "degrees, times in UTC. Errors are problem details (RFC 9457)."
 )
 
@@ -34,10 +44,11 @@ def make_app() -> FastAPI:
         docs_url=None,
         redoc_url=None,
     )
-    app.state.routers = [
-        module.router
-        for module in (root, scans, designs, evaluations, rigs, captures, rigtests, sessions)
-    ]
+    resources = (
+        *(root, scans, designs, exports, evaluations),
+        *(rigs, captures, rigtests, sessions),
+    )
+    app.state.routers = [module.router for module in resources]
     for router in app.state.routers:
         app.include_router(router)
     install_error_handlers(app)

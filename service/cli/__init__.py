@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from service.cli import rigcommands
+from service.cli import partcommands, rigcommands
 
 app = typer.Typer(
     name="rigwright",
@@ -184,6 +184,7 @@ def serve(
     run_serve_command(host, port, data, station)
 
 
+partcommands.add_to(app)
 rigcommands.add_to(app)
 
 

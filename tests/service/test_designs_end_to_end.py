@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import copy
+import io
 import json
 import os
 import signal
 import subprocess
 import time
 import tomllib
+import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -125,6 +127,19 @@ class TestOverHttp:
         scene = http.get(f"{own}/files/scene.glb")
         assert scene.headers["content-type"] == "model/gltf-binary"
         assert scene.content[:4] == b"glTF"
+
+    def test_its_cameras_go_to_other_programs(self, http: TestClient, completed: JSON) -> None:
+        own = completed["links"]["self"]
+        formats = http.get(f"{own}/exports").json()["items"]
+        assert {"colmap-text", "metashape-xml", "opencv"} <= {form["name"] for form in formats}
+        answer = http.get(f"{own}/exports/colmap-text")
+        assert answer.headers["content-type"] == "application/zip"
+        with zipfile.ZipFile(io.BytesIO(answer.content)) as archive:
+            cameras = archive.read("cameras.txt").decode()
+        placed = http.get(f"{own}/design").json()["cameras"]
+        lines = [line for line in cameras.splitlines() if line and not line.startswith("#")]
+        assert len(lines) == len(placed)
+        assert http.get(f"{own}/exports/colmpa").status_code == 404
 
     def test_progress_was_told_and_never_fell(self, http: TestClient, completed: JSON) -> None:
         answer = http.get(f"{completed['links']['self']}/events")
