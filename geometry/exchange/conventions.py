@@ -31,31 +31,11 @@ def numbers(values: Floats) -> str:
 
 
 def quaternion_wxyz(rotation: Floats) -> Floats:
-    """Unit quaternion w, x, y, z (Hamilton) of a rotation (3, 3), (4,); w is not negative.
+    """Unit quaternion w, x, y, z (Hamilton) of a rotation (3, 3), (4,); w is not negative."""
+    from scipy.spatial.transform import Rotation
 
-    The largest of the four components is computed first and the others divided by it, so that
-    no half turn loses digits.
-    """
-    r = np.asarray(rotation, dtype=np.float64)
-    squares = np.array(
-        [
-            1.0 + r[0, 0] + r[1, 1] + r[2, 2],
-            1.0 + r[0, 0] - r[1, 1] - r[2, 2],
-            1.0 - r[0, 0] + r[1, 1] - r[2, 2],
-            1.0 - r[0, 0] - r[1, 1] + r[2, 2],
-        ]
-    )
-    rows = np.array(
-        [
-            [squares[0], r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]],
-            [r[2, 1] - r[1, 2], squares[1], r[0, 1] + r[1, 0], r[0, 2] + r[2, 0]],
-            [r[0, 2] - r[2, 0], r[0, 1] + r[1, 0], squares[2], r[1, 2] + r[2, 1]],
-            [r[1, 0] - r[0, 1], r[0, 2] + r[2, 0], r[1, 2] + r[2, 1], squares[3]],
-        ]
-    )
-    quaternion = rows[int(np.argmax(squares))]
-    quaternion = quaternion / np.linalg.norm(quaternion)
-    return np.asarray(quaternion if quaternion[0] >= 0.0 else -quaternion)
+    x, y, z, w = Rotation.from_matrix(rotation).as_quat(canonical=True)
+    return np.array([w, x, y, z])
 
 
 def translation_mm(pose: Pose) -> Floats:

@@ -1,18 +1,15 @@
-"""COLMAP's ``rig_config.json``: the only place here that knows COLMAP's conventions.
+"""COLMAP's ``rig_config.json``, by which it knows a session's pictures as those of one rig.
 
-COLMAP counts pixels from the corner of the first pixel (ours from its middle), takes the pose of
-each camera seen from a reference camera, and finds pictures by folder. Its image path is the
-session's folder ``images``. Lengths stay millimetres.
+COLMAP takes the pose of each camera seen from a reference camera, and finds pictures by folder. Its
+image path is the session's folder ``images``. Lengths stay millimetres.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
-import numpy as np
-
-from geometry.arrays import Floats
 from geometry.camera import Camera, RigCamera
+from geometry.exchange.conventions import corner_principal_point_px, quaternion_wxyz
 
 RIG = "rig1"
 
@@ -41,14 +38,6 @@ def _camera(name: str, placed: RigCamera, reference: RigCamera) -> dict[str, obj
 
 def full_opencv(camera: Camera) -> list[float]:
     """fx, fy, cx, cy, k1, k2, p1, p2, k3, k4, k5, k6 with COLMAP's pixel centres."""
-    f, (cx, cy) = camera.focal_length_px, camera.principal_point_px
+    f, (cx, cy) = camera.focal_length_px, corner_principal_point_px(camera)
     k1, k2, p1, p2, k3 = camera.distortion.tolist()
-    return [f, f, float(cx) + 0.5, float(cy) + 0.5, k1, k2, p1, p2, k3, 0.0, 0.0, 0.0]
-
-
-def quaternion_wxyz(rotation: Floats) -> Floats:
-    """The unit quaternion (4,) of a rotation (3, 3), w not negative."""
-    from scipy.spatial.transform import Rotation
-
-    x, y, z, w = Rotation.from_matrix(rotation).as_quat(canonical=True)
-    return np.array([w, x, y, z])
+    return [f, f, float(cx), float(cy), k1, k2, p1, p2, k3, 0.0, 0.0, 0.0]
