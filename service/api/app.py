@@ -27,8 +27,8 @@ from service.api.middleware import JsonLimit, RequestLog
 from service.api.models import Problem
 
 _DESCRIPTION = (
-    "Designs and runs multi-camera rigs that photograph a face. Lengths are in millimetres, angles in "
-    "degrees, times in UTC. Errors are problem details (RFC 9457)."
+    "Designs and runs multi-camera rigs that photograph a face. Lengths are in millimetres, angles "
+    "in degrees, times in UTC. Errors are problem details (RFC 9457)."
 )
 
 
