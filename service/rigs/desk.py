@@ -35,6 +35,9 @@ JSON = dict[str, Any]
 Work = Callable[[Rig, Sessions, ProgressCallback, CancelToken], JSON]
 """What a job does with the open rig; returns its result."""
 
+_REOPEN_S = 5.0
+"""How often devices are looked for that were not there: somebody plugs them in sooner or later."""
+
 _GONE = (TriggerState.DISCONNECTED, TriggerState.OPENING, TriggerState.PROBING)
 
 
@@ -163,7 +166,7 @@ class RigDesk:
     def _serve(self) -> None:
         self._try_to_open()
         while True:
-            order = self._orders.get()
+            order = self._next_order()
             if order is not None:
                 self._do(*order)
             elif self._stopping:
@@ -173,6 +176,13 @@ class RigDesk:
         self._sessions.close()
         if self._rig is not None:
             self._rig.close()
+
+    def _next_order(self) -> tuple[JobRecord, Work] | None:
+        """What is asked for next; None now and then while the rig is not open."""
+        try:
+            return self._orders.get(timeout=_REOPEN_S if self._rig is None else None)
+        except queue.Empty:
+            return None
 
     def _try_to_open(self) -> None:
         try:

@@ -209,7 +209,6 @@ class TestDevicesThatAreNotWell:
             refused = client.post("/v1/rigs/studio/captures", json={"capture_id": "one"})
             assert refused.status_code == 503
             with start_fake(link=link):
-                client.post("/v1/rigs/studio/captures", json={"capture_id": "one"})
                 wait_for(lambda: client.get("/v1/rigs/studio").json()["status"] == "ready")
         service.close()
 

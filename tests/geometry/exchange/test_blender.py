@@ -13,7 +13,7 @@ from exchange_rigs import many_cameras, points_in_view
 
 from geometry.exchange import write_export
 
-BLENDER_PYTHON = os.environ.get("RIGWRIGHT_BLENDER_PYTHON")
+BLENDER_PYTHON = os.environ.get("TESTS_BLENDER_PYTHON")
 
 PROBE = """
 import json, runpy, sys
@@ -55,7 +55,7 @@ def blender_pixels(how: str, path: Path, tmp_path: Path) -> dict[str, np.ndarray
     return {name: np.array(pixels) for name, pixels in json.loads(out.read_text()).items()}
 
 
-@pytest.mark.skipif(BLENDER_PYTHON is None, reason="RIGWRIGHT_BLENDER_PYTHON names no interpreter")
+@pytest.mark.skipif(BLENDER_PYTHON is None, reason="TESTS_BLENDER_PYTHON names no interpreter")
 def test_blender_builds_cameras_that_see_as_ours(tmp_path: Path) -> None:
     cameras = many_cameras(False)
     path = write_export(tmp_path / "out", "blender", cameras)["cameras_blender.py"]
@@ -67,7 +67,7 @@ def test_blender_builds_cameras_that_see_as_ours(tmp_path: Path) -> None:
         assert np.abs(found[camera.name] - 0.5 - pixels).max() < 5e-3
 
 
-@pytest.mark.skipif(BLENDER_PYTHON is None, reason="RIGWRIGHT_BLENDER_PYTHON names no interpreter")
+@pytest.mark.skipif(BLENDER_PYTHON is None, reason="TESTS_BLENDER_PYTHON names no interpreter")
 def test_blender_imports_the_glb_with_its_cameras(tmp_path: Path) -> None:
     cameras = many_cameras(False)
     path = write_export(tmp_path / "out", "gltf", cameras)["cameras.glb"]
