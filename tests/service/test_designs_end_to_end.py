@@ -172,6 +172,7 @@ class TestOverHttp:
         job = finished(http, http.post("/v1/designs", json=asked).headers["Location"])
         assert (job["result"]["cameras"], job["result"]["seed"]) == (3, 11)
 
+    @pytest.mark.slow
     def test_limits_in_conflict_complete_with_the_nearest_design(
         self, http: TestClient, scan_id: str, small_rig: JSON
     ) -> None:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import fcntl
 import importlib.util
 import shutil
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -47,6 +49,17 @@ def worlds() -> list[object]:
         name: [getattr(pytest.mark, f"needs_{name}")] for name in ("aravis", "genicam", "gphoto2")
     }
     return [pytest.param(name, marks=marks.get(name, [])) for name in RIGS]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _one_gige_network_at_a_time(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Fake GigE cameras all answer on one network: tests side by side would find each other's."""
+    if not request.module.__name__.rpartition(".")[2].startswith(("test_aravis", "test_conf")):
+        yield
+        return
+    with (Path(tempfile.gettempdir()) / "rigwright-tests-gige.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
 
 
 @pytest.fixture(scope="module", params=worlds())

@@ -153,6 +153,7 @@ def test_the_real_scan_is_closed_and_stands_where_the_design_has_it() -> None:
         assert np.allclose(end(mesh.vertices_mm, axis=0), end(scan.vertices_mm, axis=0), atol=1e-6)
 
 
+@pytest.mark.slow
 @real_scan
 @needs_scan
 def test_a_real_head_at_full_size_takes_two_seconds() -> None:
