@@ -194,7 +194,7 @@ def fire_fake(fires: int, seed: int) -> Tally:
                 shooter.fire(chance.choice(mishaps) if struck else None)
                 shooter.tally.faults["mishap"] += struck
                 if len(shooter.asked) > 2 * fires + 50:
-                    raise RuntimeError(f"the box does not come back: {box.health().last_problem}")
+                    raise RuntimeError(f"no way back: {box.health()}, {shooter.tally}")
         finally:
             box.close()
         fake.box.advance()

@@ -40,6 +40,7 @@ class Captures:
         self._flights: OrderedDict[str, Flight] = OrderedDict()
         self._current: Flight | None = None
         self._resolve_ns: int | None = None
+        self._given_up: set[str] = set()
         self.resolved = threading.Condition()
         """Notified when a flight has got its report."""
 
@@ -67,6 +68,7 @@ class Captures:
         self._keeper.set_outputs(program)
         flight = Flight(program, self._keeper.view.boots)
         self._remember(flight)
+        flight.wanted = flight.id not in self._given_up
         try:
             made = self._keeper.talk.arm(program)
         except RefusedError as refused:
@@ -84,6 +86,23 @@ class Captures:
         for _ in range(SAMPLES_AROUND):
             self._keeper.sample()
         flight.fit = self._keeper.fit()
+
+    def give_up(self, capture_id: str) -> None:
+        """Who asked to arm it waits no more; from any thread.
+
+        The order may be under way still, and even succeed: then nobody would fire or disarm it.
+        """
+        self._given_up.add(capture_id)
+        flight = self._flights.get(capture_id)
+        if flight is not None and not flight.fire_sent:
+            flight.wanted = False
+
+    def clear_up(self, capture_id: str) -> None:
+        """Disarm what was armed for somebody who had given up."""
+        flight = self._flights.get(capture_id)
+        self._given_up.discard(capture_id)
+        if flight is not None and flight.open and self._stale(flight):
+            self._resolve(flight)
 
     def fire(self, capture_id: str) -> None:
         """Fire once, whatever is lost on the way."""

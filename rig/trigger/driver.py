@@ -150,7 +150,13 @@ class SerialTriggerBox:
             raise _closed()
         program = compile_program(request, limits)
         self._armed_ns = {request.capture_id: time.monotonic_ns()}
-        self._order(lambda: self._captures.arm(program))
+        try:
+            self._order(lambda: self._captures.arm(program))
+        except DeviceError:
+            self._captures.give_up(request.capture_id)
+            if self._queue is not None:
+                self._queue.put(lambda: self._captures.clear_up(request.capture_id))
+            raise
 
     def fire(self, capture_id: str) -> None:
         """Fire the armed capture, at most once for ever.

@@ -20,12 +20,15 @@ from trigger_boxes import (
 )
 
 from geometry.errors import ConflictError, DeviceError
+from rig.trigger import driver as driver_module
 from rig.trigger import owner
 from rig.trigger.box import ArmRequest, Outcome, Pulse, TriggerState
 from rig.trigger.driver import BoxAddress, SerialTriggerBox
 from rig.trigger.endpoint import PtyEndpoint
 from rig.trigger.fake.program import FakeTrigger
+from rig.trigger.keeper import Keeper
 from rig.trigger.metrics import WireLine
+from rig.trigger.program import Program
 
 # -- orders --------------------------------------------------------------------------------------
 
@@ -64,6 +67,30 @@ def test_arming_twice_and_using_an_id_again(fake: FakeTrigger, driver: SerialTri
     driver.wait_done("a", 2.0)
     with named_in_time(ConflictError, "conflict/trigger-refused"):
         driver.arm(request_for("a"))
+    assert rises(fake) == ONE_EACH
+
+
+def test_an_arming_that_comes_too_late_blocks_nobody(
+    fake: FakeTrigger, driver: SerialTriggerBox, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A busy computer: who asked has given up by the time the box is armed."""
+    held, go = threading.Event(), threading.Event()
+    set_outputs = Keeper.set_outputs
+
+    def slow(keeper: Keeper, program: Program) -> None:
+        held.set()
+        go.wait(2.0)
+        set_outputs(keeper, program)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Keeper, "set_outputs", slow)
+        patch.setattr(driver_module, "PATIENCE_S", 0.05)
+        with named_in_time(DeviceError, "device/trigger-gone"):
+            driver.arm(request_for("late"))
+        assert held.is_set()
+        go.set()
+    assert driver.wait_done("late", 2.0).outcome is Outcome.NOT_FIRED
+    fire_whole(driver, "b")
     assert rises(fake) == ONE_EACH
 
 
