@@ -139,15 +139,21 @@ class JobManager:
         return self._engine.run(task, report, cancel)
 
     def _inputs(self, job: JobRecord, folder: Path) -> dict[str, Path]:
-        if job.scan_id is None:
-            return {}
-        scan = self._store.scans.get(job.scan_id)
-        # Readers tell formats apart by the suffix, which files kept by hash do not have. In a
-        # folder of its own it cannot meet another file's name.
-        link = folder / "inputs" / scan.plain_name
-        link.parent.mkdir()
-        link.symlink_to(self._store.scans.path(scan).resolve())
-        return {"scan": link}
+        """Links to the job's files under their own names.
+
+        Readers tell formats apart by the suffix, which files kept by hash do not have. Each has
+        a folder of its own, where it cannot meet another file's name.
+        """
+        given = self._store.jobs.inputs(job.id)
+        if job.scan_id is not None:
+            scan = self._store.scans.get(job.scan_id)
+            given["scan"] = (scan.plain_name, self._store.scans.path(scan))
+        links = {}
+        for role, (name, path) in given.items():
+            links[role] = folder / "inputs" / role / name
+            links[role].parent.mkdir(parents=True)
+            links[role].symlink_to(path.resolve())
+        return links
 
     def _keep(self, job: JobRecord, result: dict[str, Any], folder: Path) -> None:
         files = {

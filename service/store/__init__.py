@@ -18,6 +18,7 @@ from geometry.errors import InputError, InternalError
 from service.store import idempotency
 from service.store.blobs import Blobs, known_files
 from service.store.database import Database
+from service.store.documents import Documents
 from service.store.jobs import Jobs
 from service.store.lock import FolderLock
 from service.store.scans import Scans
@@ -64,6 +65,7 @@ class Store:
             ) from error
         self.files = Blobs(folder)
         self.scans = Scans(self.database, self.files)
+        self.documents = Documents(self.database, self.files)
         self.jobs = Jobs(self.database, self.files)
         self.service_uuid = self.database.write(_identify)
         self._work = folder / "work"

@@ -17,12 +17,13 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from sqlalchemy import Connection, delete, exists, select
+from sqlalchemy import Connection, and_, delete, exists, select
 from sqlalchemy.dialects.sqlite import insert
 
-from service.store.tables import blobs, job_files, scans, utc_now
+from service.store.tables import blobs, documents, job_files, job_inputs, scans, utc_now
 
 _CHUNK_BYTES = 1 << 20
+_REFERRING = (scans, documents, job_inputs, job_files)
 
 
 @dataclass(frozen=True)
@@ -111,8 +112,8 @@ class Blobs:
 
     def forget_unused(self, connection: Connection) -> list[str]:
         """Remove the rows of files that nothing refers to; give the list to :meth:`remove`."""
-        unused = ~exists().where(scans.c.blob_sha256 == blobs.c.sha256) & ~exists().where(
-            job_files.c.blob_sha256 == blobs.c.sha256
+        unused = and_(
+            *(~exists().where(table.c.blob_sha256 == blobs.c.sha256) for table in _REFERRING)
         )
         hashes = list(connection.scalars(select(blobs.c.sha256).where(unused)))
         connection.execute(delete(blobs).where(unused))

@@ -55,12 +55,25 @@ class FileRecord:
 
 
 @dataclass(frozen=True)
+class JobInput:
+    """A file of the store that a job works on; the job keeps it, whoever else forgets it.
+
+    ``name`` is what the file is called in the job's folder: readers go by the suffix.
+    """
+
+    role: str
+    name: str
+    sha256: str
+
+
+@dataclass(frozen=True)
 class NewJob:
     """What is asked for."""
 
     kind: str
     request: JSON
     scan_id: str | None = None
+    inputs: tuple[JobInput, ...] = ()
 
 
 def one_job(connection: Connection, job_id: str, kind: str | None = None) -> JobRecord:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import uuid
 from collections.abc import Collection, Mapping
+from pathlib import Path
 
 from sqlalchemy import Connection, delete, exists, func, insert, select, update
 
@@ -20,6 +21,7 @@ from service.store.jobrecords import (
     JSON,
     FileRecord,
     JobEvent,
+    JobInput,
     JobRecord,
     NewJob,
     append_event,
@@ -29,7 +31,16 @@ from service.store.jobrecords import (
     restored,
     set_status,
 )
-from service.store.tables import JobStatus, blobs, job_events, job_files, jobs, scans, utc_now
+from service.store.tables import (
+    JobStatus,
+    blobs,
+    job_events,
+    job_files,
+    job_inputs,
+    jobs,
+    scans,
+    utc_now,
+)
 
 
 class Jobs:
@@ -121,6 +132,8 @@ class Jobs:
                 started_at=now if status is JobStatus.RUNNING else None,
             )
         )
+        for given in new.inputs:
+            _give(connection, job_id, given)
         append_event(connection, job_id, status, {"status": status})
         return one_job(connection, job_id)
 
@@ -170,6 +183,12 @@ class Jobs:
         )
         rows = self._database.read(lambda connection: connection.execute(query).mappings().all())
         return [FileRecord(**row, path=self._files.path(row["sha256"])) for row in rows]
+
+    def inputs(self, job_id: str) -> dict[str, tuple[str, Path]]:
+        """The files a job was given: by role the name, and where it is kept."""
+        query = select(job_inputs).where(job_inputs.c.job_id == job_id)
+        rows = self._database.read(lambda connection: connection.execute(query).mappings().all())
+        return {row["role"]: (row["name"], self._files.path(row["blob_sha256"])) for row in rows}
 
     def claim_next(self) -> JobRecord | None:
         """Turn the oldest pending job into a running one; None when nothing waits."""
@@ -285,3 +304,16 @@ class Jobs:
             return ids
 
         return self._database.write(change)
+
+
+def _give(connection: Connection, job_id: str, given: JobInput) -> None:
+    kept = exists().where(blobs.c.sha256 == given.sha256)
+    if not connection.scalar(select(kept)):
+        raise NotFoundError(
+            given.role, f"the {given.role} has just been removed", "make it again, then ask again"
+        )
+    connection.execute(
+        insert(job_inputs).values(
+            job_id=job_id, role=given.role, name=given.name, blob_sha256=given.sha256
+        )
+    )

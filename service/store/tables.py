@@ -124,6 +124,29 @@ job_files = Table(
     Column("media_type", String, nullable=False),
 )
 
+job_inputs = Table(
+    "job_inputs",
+    metadata,
+    Column("job_id", String, ForeignKey("jobs.id", ondelete="CASCADE"), primary_key=True),
+    Column("role", String, primary_key=True),
+    Column("name", String, nullable=False),
+    Column("blob_sha256", String, ForeignKey("blobs.sha256"), nullable=False, index=True),
+)
+
+documents = Table(
+    "documents",
+    metadata,
+    Column("seq", Integer, primary_key=True, autoincrement=True),
+    Column("id", String, nullable=False, unique=True),
+    Column("kind", String, nullable=False),
+    Column("blob_sha256", String, ForeignKey("blobs.sha256"), nullable=False, index=True),
+    Column("filename", String, nullable=False),
+    Column("report", JSON(none_as_null=True), nullable=False),
+    Column("created_at", String, nullable=False),
+    Index("ix_documents_kind_seq", "kind", "seq"),
+    sqlite_autoincrement=True,
+)
+
 idempotency = Table(
     "idempotency",
     metadata,
