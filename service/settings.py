@@ -46,6 +46,9 @@ class Settings(BaseSettings):
     max_upload_bytes: Annotated[int, Field(ge=1, description="Largest scan that is accepted.")] = (
         512 << 20
     )
+    max_pictures_bytes: Annotated[
+        int, Field(ge=1, description="Largest archive of pictures that is accepted.")
+    ] = 4 << 30
     jobs_at_once: Annotated[int, Field(ge=1, le=64, description="Jobs that run side by side.")] = 1
     workers_per_job: Annotated[
         int, Field(ge=1, le=1024, description="Processes that one design may use.")

@@ -15,6 +15,7 @@ from service.api import (
     designs,
     evaluations,
     exports,
+    picturesets,
     rigs,
     rigtests,
     root,
@@ -47,6 +48,7 @@ def make_app() -> FastAPI:
     resources = (
         *(root, scans, designs, exports, evaluations),
         *(rigs, captures, rigtests, sessions),
+        picturesets,
     )
     app.state.routers = [module.router for module in resources]
     for router in app.state.routers:

@@ -17,6 +17,13 @@ router = APIRouter(tags=["service"])
 _LITTLE_DISK_BYTES = 1 << 30
 
 
+_RESOURCES = (
+    *("health", "scans", "designs", "evaluations"),
+    *("rigs", "captures", "rig-tests", "sessions"),
+    "picture-sets",
+)
+
+
 class ServiceDocument(Model):
     """What this service is. ``id`` stays the same for the life of its data folder."""
 
@@ -45,7 +52,7 @@ class Health(Model):
 @router.get("/v1", response_model=ServiceDocument)
 def read_service(service: ServiceDep) -> ServiceDocument:
     """Read what this service is and what it offers."""
-    links = {name: f"/v1/{name}" for name in ("health", "scans", "designs", "evaluations")}
+    links = {name: f"/v1/{name}" for name in _RESOURCES}
     return ServiceDocument(
         id=service.store.service_uuid,
         name="rigwright",

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import re
-import secrets
-import shutil
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
@@ -13,17 +11,16 @@ from typing import Any
 
 from anyio import CancelScope, to_thread
 from fastapi import Request
-from starlette.requests import ClientDisconnect
 
-from geometry.errors import CancelledError, InputError, InternalError, NotFoundError, TooLargeError
+from geometry.errors import InputError, InternalError, NotFoundError
 from service.api.context import Service
-from service.jobs.engine import JobKind, Task
+from service.api.receiving import died, read_apart, receive
+from service.jobs.engine import JobKind
 from service.store import idempotency
-from service.store.blobs import StagedFile, Staging
+from service.store.blobs import StagedFile
 from service.store.idempotency import IdempotencyKey
 from service.store.scans import ScanRecord, plain_name, scan_identity
 
-_WRITE_BYTES = 1 << 20
 _SUFFIX = re.compile(r"^\.[a-z0-9]{1,8}$")
 _MEDIA_TYPE = re.compile(r"^[\w.+-]{1,80}/[\w.+-]{1,80}$")
 
@@ -75,11 +72,9 @@ async def take_in(service: Service, request: Request, upload: Upload) -> tuple[S
 
     Whatever goes wrong on the way, nothing of the upload stays.
     """
-    _refuse_if_announced_too_large(request, service.settings.max_upload_bytes)
     async with _claimed(service, upload.idempotency_key) as stored:
         with service.store.files.stage(upload.suffix) as staging:
-            await _receive(request, staging, service.settings.max_upload_bytes)
-            staged = await to_thread.run_sync(staging.finish)
+            staged = await receive(request, staging, service.settings.max_upload_bytes, "scan")
             if stored is not None:
                 scan_id = upload.scan_id(staged)
                 new = bool(idempotency.replay(stored, scan_id)["new"])
@@ -87,20 +82,6 @@ async def take_in(service: Service, request: Request, upload: Upload) -> tuple[S
             return await to_thread.run_sync(
                 _read_and_keep, service, staged, upload, limiter=service.imports
             )
-
-
-def _too_large(limit: int) -> TooLargeError:
-    return TooLargeError(
-        "upload",
-        f"the file is larger than the {limit / (1 << 20):.0f} MiB that are accepted",
-        "reduce the scan, or raise RIGWRIGHT_MAX_UPLOAD_BYTES",
-    )
-
-
-def _refuse_if_announced_too_large(request: Request, limit: int) -> None:
-    announced = request.headers.get("content-length", "")
-    if announced.isdecimal() and int(announced) > limit:
-        raise _too_large(limit)
 
 
 @asynccontextmanager
@@ -124,26 +105,6 @@ async def _claimed(
                 )
 
 
-async def _receive(request: Request, staging: Staging, limit: int) -> None:
-    waiting, received = bytearray(), 0
-    try:
-        async for chunk in request.stream():
-            received += len(chunk)
-            if received > limit:
-                raise _too_large(limit)
-            waiting += chunk
-            if len(waiting) >= _WRITE_BYTES:
-                await to_thread.run_sync(staging.write, bytes(waiting))
-                waiting.clear()
-    except ClientDisconnect:
-        raise InputError(
-            "upload-truncated", "the upload broke off", "send the whole file again"
-        ) from None
-    if received == 0:
-        raise InputError("scan-empty", "the upload is empty", "send the scan's bytes as the body")
-    await to_thread.run_sync(staging.write, bytes(waiting))
-
-
 def _read_and_keep(service: Service, staged: StagedFile, upload: Upload) -> tuple[ScanRecord, bool]:
     scan_id = upload.scan_id(staged)
     try:
@@ -162,7 +123,6 @@ def _read_and_keep(service: Service, staged: StagedFile, upload: Upload) -> tupl
 
 
 def _read(service: Service, staged: StagedFile, upload: Upload) -> dict[str, Any]:
-    """Parsing happens in a process with limits: a file from outside may be anything."""
     settings = service.settings
     kind = JobKind(
         "scan-import",
@@ -170,25 +130,14 @@ def _read(service: Service, staged: StagedFile, upload: Upload) -> dict[str, Any
         time_limit_s=settings.scan_time_limit_s,
         memory_limit_bytes=settings.scan_memory_limit_bytes,
     )
-    folder = service.store.work_folder(f"import-{secrets.token_hex(8)}")
-    link = folder / "inputs" / plain_name(upload.filename)
+    name = plain_name(upload.filename)
     try:
-        for path in (folder / "files", link.parent):
-            path.mkdir()
-        link.symlink_to(staged.path.resolve())
-        task = Task(kind, {"options": upload.options}, folder / "files", {"scan": link})
-        return service.engine.run(task, lambda _: None, service.stopping)
-    except CancelledError:
-        raise InternalError(
-            "stopping", "the service is stopping", "send the scan again later"
-        ) from None
+        return read_apart(service, kind, staged, name, {"options": upload.options})
     except InternalError as error:
-        if error.detail != "worker-died":
+        if not died(error):
             raise
         raise InputError(
             "scan-unreadable",
             "the file brings down the program that reads it",
             "export the scan again, for example as PLY",
         ) from error
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)

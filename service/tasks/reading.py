@@ -20,7 +20,7 @@ def import_scan(
 ) -> dict[str, Any]:
     """Tell what is in a scan and what was inferred or changed to read it."""
     del folder, report, cancel
-    scan = read_scan(inputs["scan"], ScanSection.model_validate(request["options"]).to_options())
+    scan = read_scan(inputs["upload"], ScanSection.model_validate(request["options"]).to_options())
     return {
         "vertices": len(scan.vertices_mm),
         "faces": len(scan.faces),

@@ -16,7 +16,7 @@ from service.store.tables import JobStatus
 
 
 def keep(
-    store: Store, content: bytes, kind: str = "target set", name: str = "a b.toml"
+    store: Store, content: bytes, kind: str = "target-set", name: str = "a b.toml"
 ) -> DocumentRecord:
     with store.files.stage() as staging:
         staging.write(content)
@@ -25,25 +25,25 @@ def keep(
 
 def test_the_same_content_is_the_same_document_within_its_kind(store: Store) -> None:
     one, again = keep(store, b"x"), keep(store, b"x", name="other.toml")
-    other = keep(store, b"x", kind="pictures")
+    other = keep(store, b"x", kind="picture-set")
     assert (one, other.sha256) == (again, one.sha256)
     assert one.id != other.id
     assert store.documents.path(one).read_bytes() == b"x"
     assert len(files_under(store.folder / "blobs")) == 1
-    assert [d.id for d in store.documents.page("target set", 10, None)] == [one.id]
+    assert [d.id for d in store.documents.page("target-set", 10, None)] == [one.id]
 
 
 def test_a_document_of_another_kind_is_not_found(store: Store) -> None:
     one = keep(store, b"x")
-    with pytest.raises(NotFoundError, match="there is no pictures"):
-        store.documents.get("pictures", one.id)
+    with pytest.raises(NotFoundError, match="there is no picture-set"):
+        store.documents.get("picture-set", one.id)
 
 
 def test_a_job_keeps_what_it_was_given(store: Store) -> None:
     one = keep(store, b"x")
     new = NewJob("count", {}, inputs=(one.as_input("targets"),))
     job = store.jobs.create(new, max_pending=9)
-    store.documents.remove("target set", one.id)
+    store.documents.remove("target-set", one.id)
     ((role, (name, path)),) = store.jobs.inputs(job.id).items()
     assert (role, name, path.read_bytes()) == ("targets", "a_b.toml", b"x")
     store.jobs.claim_next()
@@ -61,11 +61,11 @@ def test_a_job_cannot_be_given_what_is_gone(store: Store) -> None:
 
 def test_pages_of_documents(store: Store) -> None:
     records = [keep(store, bytes([n])) for n in range(3)]
-    assert [d.seq for d in store.documents.page("target set", 2, None)] == [
+    assert [d.seq for d in store.documents.page("target-set", 2, None)] == [
         records[2].seq,
         records[1].seq,
     ]
-    assert store.documents.page("target set", 2, records[1].seq) == [records[0]]
+    assert store.documents.page("target-set", 2, records[1].seq) == [records[0]]
 
 
 def test_a_store_of_the_first_version_is_brought_up_to_date(tmp_path: Path) -> None:
