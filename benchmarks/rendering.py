@@ -29,15 +29,9 @@ import numpy as np
 from geometry.camera import Body, Camera, RigCamera
 from geometry.frames import Pose
 from geometry.raycast import Occluder
+from rig.simulation.flatsettings import BoardSettings, PlaceSettings, TargetSettings
 from rig.simulation.sampling import LINEAR_OF_SRGB
-from rig.simulation.settings import (
-    BoardSettings,
-    HeadSettings,
-    PlaceSettings,
-    SceneSettings,
-    SensorSettings,
-    TargetSettings,
-)
+from rig.simulation.settings import HeadSettings, SceneSettings, SensorSettings
 from rig.simulation.studio import Shot, Studio
 
 CAMERAS = 7

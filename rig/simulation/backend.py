@@ -62,6 +62,7 @@ class SimulatedBackend:
         self._gone: set[str] = set()
         self._origins: dict[str, int] = {}
         self._heard: dict[str, None] = {}
+        self._captures = 0
         self._unsubscribe = box.subscribe(self.expose) if box is not None else None
 
     @property
@@ -105,6 +106,8 @@ class SimulatedBackend:
             if report.capture_id in self._heard or not report.edges:
                 return
             self._heard[report.capture_id] = None
+            self._captures += 1
+            capture = self._captures
             while len(self._heard) > _REMEMBERED:
                 self._heard.pop(next(iter(self._heard)))
             devices = list(self._devices.items())
@@ -117,7 +120,8 @@ class SimulatedBackend:
         zeros = {e.shot: e.at_host_ns for e in reversed(rising) if e.output == sync}
         for name, device in devices:
             for edge in self._edges_of(name, rising):
-                device.triggered(Triggered(edge.at_host_ns, origin, zeros.get(edge.shot)))
+                zero = zeros.get(edge.shot)
+                device.triggered(Triggered(edge.at_host_ns, origin, zero, capture))
 
     def replug(self, camera_id: str) -> None:
         """Plug an unplugged camera in again; it can then be opened anew."""

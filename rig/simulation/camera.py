@@ -39,12 +39,14 @@ class Triggered:
     """What makes a camera expose, in instants of the host's clock.
 
     ``origin_ns``: when the head is in its place, None for a camera that runs freely;
-    ``board_zero_ns``: when the timing board's counter started, None if it runs freely.
+    ``board_zero_ns``: when the timing board's counter started, None if it runs freely;
+    ``capture`` counts the captures.
     """
 
     at_host_ns: int
     origin_ns: int | None
     board_zero_ns: int | None = None
+    capture: int = 0
 
 
 class SimulatedCamera:
@@ -298,7 +300,14 @@ class SimulatedCamera:
             board_ns * 1e-3,
             (*self._seed, self._number),
             "black" in lot.faults,
+            trigger.capture,
+            **self._knock(),
         )
+
+    def _knock(self) -> dict[str, tuple[float, float, float]]:
+        if not self._faults.knocked(self._number):
+            return {}
+        return {"moved_mm": self._faults.moved_mm, "turned_deg": self._faults.turned_deg}
 
     def _with_meanwhile(self, arrived: list[Coming]) -> list[Coming]:
         """Wait for the pictures of frames that have arrived, and of those that came meanwhile.

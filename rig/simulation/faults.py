@@ -7,6 +7,8 @@ from dataclasses import dataclass, fields
 
 from geometry.errors import InputError
 
+Triple = tuple[float, float, float]
+
 _CHANCES = (
     "drop",
     "miss",
@@ -35,6 +37,10 @@ class CameraFaults:
     moment of arming, whatever the trigger does (its cable is off). ``swapped_to_output`` is the
     output it really hangs on. ``timestamp_reset_at_shot`` begins the camera's clock at 0 again
     just before that exposure; ``unplug_at_shot`` takes the camera away instead of exposing.
+
+    From exposure ``knocked_at_shot`` on the camera stands ``moved_mm`` from where the design has
+    it and is turned by ``turned_deg``, both about the camera's own axes (x right, y down, z
+    forward): somebody has knocked against it.
     Raises :class:`InputError` for impossible values.
     """
 
@@ -56,6 +62,9 @@ class CameraFaults:
     swapped_to_output: int | None = None
     timestamp_reset_at_shot: int | None = None
     unplug_at_shot: int | None = None
+    moved_mm: Triple = (0.0, 0.0, 0.0)
+    turned_deg: Triple = (0.0, 0.0, 0.0)
+    knocked_at_shot: int = 1
 
     def __post_init__(self) -> None:
         for entry in fields(self):
@@ -70,13 +79,24 @@ class CameraFaults:
                 self._refuse(name, getattr(self, name), "give 0 or more")
         if self.free_run_interval_ms < 1.0:
             self._refuse("free_run_interval_ms", self.free_run_interval_ms, "give 1 ms or more")
-        numbers = (self.swapped_to_output, self.timestamp_reset_at_shot, self.unplug_at_shot)
+        for name in ("moved_mm", "turned_deg"):
+            for value in getattr(self, name):
+                if not math.isfinite(value) or abs(value) > 1e4:
+                    self._refuse(name, value, "give three small numbers")
+        numbers = (
+            *(self.swapped_to_output, self.timestamp_reset_at_shot, self.unplug_at_shot),
+            self.knocked_at_shot,
+        )
         if any(n is not None and n < 1 for n in numbers) or any(n < 1 for n in self.only_shots):
             self._refuse("a shot or output", 0, "count shots and outputs from 1")
 
     @staticmethod
     def _refuse(name: str, value: float, remedy: str) -> None:
         raise InputError("camera-faults", f"{name} of a simulated camera is {value:g}", remedy)
+
+    def knocked(self, shot: int) -> bool:
+        """Whether the camera stands elsewhere at an exposure than its design says."""
+        return shot >= self.knocked_at_shot and any((*self.moved_mm, *self.turned_deg))
 
     @property
     def chances(self) -> dict[str, float]:

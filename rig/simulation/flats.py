@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -11,15 +11,19 @@ from numpy.typing import NDArray
 from geometry.arrays import Floats
 from geometry.camera import RigCamera
 from geometry.errors import InputError
+from rig.simulation.flatsettings import HeldSettings, PlaceSettings, TargetSettings
 from rig.simulation.heads import read_picture
+from rig.simulation.motion import rotation_by
 from rig.simulation.sampling import LINEAR_OF_SRGB, pyramid, sampled
-from rig.simulation.settings import PlaceSettings, TargetSettings
 from rig.timingboard.reading import TimingBoard, aruco_dictionary
 
 Singles = NDArray[np.float32]
 
 _PX_PER_CELL = 8
 """Of a coded face: so that its borders, and the quarters of a ChArUco square, are whole pixels."""
+
+_HALVED = 64
+"""A picture's sides are made multiples of this, to be halved six times."""
 
 _BORDER_SHARE = 0.125
 _BOARD_PX_PER_MM = 12.0
@@ -80,9 +84,7 @@ def target(settings: TargetSettings) -> Flat:
         picture = read_picture(settings.image) if settings.image else None
         if picture is None:
             raise InputError("simulation-target-image", "a target has no image", "give its file")
-        height, width = picture.shape[:2]
-        size = (settings.size_mm, settings.size_mm * height / width)
-        return placed(settings.place, size, LINEAR_OF_SRGB[picture])
+        return _pictured(settings, LINEAR_OF_SRGB[_without_colour(picture)])
     face, px_per_mm = _coded(settings)
     border = round(_BORDER_SHARE * settings.size_mm * px_per_mm)
     face = np.pad(face, border, constant_values=255)
@@ -90,6 +92,50 @@ def target(settings: TargetSettings) -> Flat:
     albedo = np.float32(0.04) + np.float32(0.82) * (face.astype(np.float32) / 255.0)
     size = (face.shape[1] / px_per_mm, face.shape[0] / px_per_mm)
     return placed(settings.place, size, albedo, blocky=True)
+
+
+def _pictured(settings: TargetSettings, face: Singles) -> Flat:
+    """A picture as a flat thing, with some pixels of white about it.
+
+    Smaller copies of it halve its sides again and again; where those are odd a copy would cover
+    less than the picture, and the target would be seen a little too large.
+    """
+    scale = settings.size_mm / face.shape[1]
+    lacking = [-side % _HALVED for side in face.shape[:2]]
+    around = [(total // 2, total - total // 2) for total in lacking]
+    more = [(0, 0)] * (face.ndim - 2)
+    face = np.pad(face, [*around, *more], constant_values=1.0)
+    size = (face.shape[1] * scale, face.shape[0] * scale)
+    flat = placed(settings.place, size, face, blocky=settings.sharp)
+    down, right = ((after - before) / 2.0 * scale for before, after in around)
+    return replace(
+        flat, centre_rig_mm=flat.centre_rig_mm + right * flat.right_rig + down * flat.down_rig
+    )
+
+
+def _without_colour(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """One channel of a grey picture: a large printed target would fill memory three times."""
+    grey = picture.ndim == 3 and not np.ptp(picture, axis=2).any()
+    return picture[..., 0] if grey else picture
+
+
+def held_up(flat: Flat, held: HeldSettings, capture: int) -> Flat:
+    """A flat thing where somebody holds it in a capture; see :class:`HeldSettings`."""
+    draw = np.random.default_rng((held.seed, capture))
+    axes = np.stack([flat.right_rig, flat.down_rig, flat.facing_rig])
+    roll, tilt = (np.radians(draw.uniform(-a, a)) for a in (held.roll_deg, held.tilt_deg))
+    way = draw.uniform(0.0, 2.0 * np.pi)
+    about = np.array([np.cos(way), np.sin(way), 0.0])
+    turned = rotation_by(about * tilt) @ rotation_by(np.array([0.0, 0.0, roll]))
+    right, down, facing = turned @ axes
+    shift = draw.uniform(-1.0, 1.0, 3) * np.array(held.within_mm)
+    return replace(
+        flat,
+        centre_rig_mm=flat.centre_rig_mm + shift,
+        right_rig=right,
+        down_rig=down,
+        facing_rig=facing,
+    )
 
 
 def _coded(settings: TargetSettings) -> tuple[NDArray[np.uint8], float]:

@@ -1,12 +1,14 @@
-"""Where the head is at an instant: a rigid motion of constant velocity and rate of turn."""
+"""Rigid motions: where the head is at an instant, and where a camera is that was knocked."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from geometry.arrays import Floats
+from geometry.camera import RigCamera
+from geometry.frames import Pose
 from rig.simulation.settings import MotionSettings
 
 
@@ -29,10 +31,10 @@ class Placement:
 def placement_at(motion: MotionSettings, time_s: float) -> Placement:
     """Where the head is ``time_s`` after (or before) it was at rest in its place."""
     turn = np.radians(np.array(motion.angular_velocity_deg_s)) * time_s
-    return Placement(_rotation(turn), np.array(motion.velocity_mm_s) * time_s)
+    return Placement(rotation_by(turn), np.array(motion.velocity_mm_s) * time_s)
 
 
-def _rotation(turn_rad: Floats) -> Floats:
+def rotation_by(turn_rad: Floats) -> Floats:
     """The rotation (3, 3) by a rotation vector (Rodrigues)."""
     angle = float(np.linalg.norm(turn_rad))
     if angle < 1e-15:
@@ -40,3 +42,17 @@ def _rotation(turn_rad: Floats) -> Floats:
     x, y, z = turn_rad / angle
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     return np.asarray(np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross)
+
+
+def knocked(
+    rig_camera: RigCamera,
+    moved_mm: tuple[float, float, float],
+    turned_deg: tuple[float, float, float],
+) -> RigCamera:
+    """The camera moved along and turned (a rotation vector) about its own axes."""
+    if not any((*moved_mm, *turned_deg)):
+        return rig_camera
+    pose = rig_camera.pose
+    turn = rotation_by(np.radians(np.array(turned_deg)))
+    position = pose.to_rig(np.array([moved_mm]))[0]
+    return replace(rig_camera, pose=Pose(position, turn.T @ pose.rotation_rig_to_camera))

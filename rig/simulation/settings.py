@@ -12,33 +12,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from geometry.errors import InputError
+from rig.simulation.checks import require, require_range
 from rig.simulation.faults import CameraFaults
-from rig.timingboard.reading import TimingBoard
+from rig.simulation.flatsettings import BoardSettings, TargetSettings
 
 Triple = tuple[float, float, float]
 Quad = tuple[float, float, float, float]
 
 PIXEL_FORMATS = ("Mono8", "Mono16", "RGB8", "RGB16")
 """8 bits are coded with the sRGB curve, 16 bits are linear."""
-
-TARGET_KINDS = ("aruco", "charuco", "image")
-
-
-def require(condition: bool, what: str, problem: str, remedy: str) -> None:
-    """Raise :class:`InputError` ``simulation-<what>`` unless the condition holds."""
-    if not condition:
-        raise InputError(f"simulation-{what}", problem, remedy)
-
-
-def require_range(name: str, value: float, low: float, high: float) -> None:
-    """Raise :class:`InputError` when a number is not within its limits, or not a number."""
-    require(
-        math.isfinite(value) and low <= value <= high,
-        name.replace("_", "-"),
-        f"{name} of the simulation is {value:g}",
-        f"give a number from {low:g} to {high:g}",
-    )
 
 
 @dataclass(frozen=True)
@@ -124,80 +106,6 @@ class MotionSettings:
         for value in self.angular_velocity_deg_s:
             require_range("angular_velocity_deg_s", value, -1e5, 1e5)
         require_range("motion_samples", self.samples, 1, 64)
-
-
-@dataclass(frozen=True)
-class PlaceSettings:
-    """Where a flat thing stands: its middle, the way its face looks, and the way its top points.
-
-    All in the rig frame. ``up_rig`` need only be roughly right.
-    """
-
-    position_rig_mm: Triple
-    facing_rig: Triple = (0.0, -1.0, 0.0)
-    up_rig: Triple = (0.0, 0.0, 1.0)
-
-    def __post_init__(self) -> None:
-        f, u = self.facing_rig, self.up_rig
-        cross = (f[1] * u[2] - f[2] * u[1], f[2] * u[0] - f[0] * u[2], f[0] * u[1] - f[1] * u[0])
-        sine = math.hypot(*cross) / max(math.hypot(*f) * math.hypot(*u), 1e-300)
-        numbers = all(map(math.isfinite, (*self.position_rig_mm, *f, *u)))
-        require(
-            numbers and sine > 1e-3,
-            "place",
-            "a flat thing of the simulation has no clear place",
-            "give position_rig_mm, and facing_rig and up_rig that do not point the same way",
-        )
-
-
-@dataclass(frozen=True)
-class TargetSettings:
-    """A flat target. ``size_mm`` is the side of a marker, of a ChArUco square, a picture's width.
-
-    ``kind`` ``aruco`` takes ``dictionary`` (an OpenCV name, AprilTags too) and ``marker_id``,
-    ``charuco`` ``dictionary`` and ``squares`` (across, down), ``image`` the file ``image``.
-    Targets have a white border of an eighth of ``size_mm``, and both sides the same face.
-    """
-
-    kind: str
-    place: PlaceSettings
-    size_mm: float
-    dictionary: str = "DICT_4X4_50"
-    marker_id: int = 0
-    squares: tuple[int, int] = (7, 5)
-    image: Path | None = None
-
-    def __post_init__(self) -> None:
-        require(
-            self.kind in TARGET_KINDS,
-            "target-kind",
-            f"a target of kind {self.kind!r} is not known",
-            f"give {', '.join(TARGET_KINDS)}",
-        )
-        require_range("target_size_mm", self.size_mm, 0.1, 1e5)
-        require(
-            self.kind != "image" or self.image is not None,
-            "target-image",
-            "a target of kind image has no image",
-            "give its file",
-        )
-
-
-@dataclass(frozen=True)
-class BoardSettings:
-    """The LED timing board: what it is, where it stands, how bright its LEDs are.
-
-    ``level`` is the radiance of an LED that is on. The counter is 0 at the rising edge of
-    ``sync_output`` in each shot; without one it runs freely, 0 at instant 0 of the host's clock.
-    """
-
-    place: PlaceSettings
-    board: TimingBoard = field(default_factory=TimingBoard)
-    level: float = 0.6
-    sync_output: int | None = None
-
-    def __post_init__(self) -> None:
-        require_range("led_level", self.level, 0.0, 1e3)
 
 
 @dataclass(frozen=True)

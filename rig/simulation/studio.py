@@ -12,11 +12,11 @@ from geometry.camera import RigCamera
 from geometry.errors import NotFoundError
 from rig.cameras.base import Image
 from rig.simulation.defocus import defocused, softened
-from rig.simulation.flats import Flat, FlatView, target, timing_board
+from rig.simulation.flats import Flat, FlatView, held_up, target, timing_board
 from rig.simulation.imaging import sharp_image
 from rig.simulation.lighting import card_light
 from rig.simulation.mesh import TexturedMesh
-from rig.simulation.motion import placement_at
+from rig.simulation.motion import knocked, placement_at
 from rig.simulation.raytable import RayTables
 from rig.simulation.sensor import developed
 from rig.simulation.settings import SceneSettings, SensorSettings
@@ -24,6 +24,7 @@ from rig.simulation.tracing import BackdropView, HeadModel, View
 from rig.timingboard.graytime import lit_shares
 
 Singles = NDArray[np.float32]
+Triple = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -32,7 +33,9 @@ class Shot:
 
     ``start_s`` is when the exposure starts, in seconds after the head is at rest in its place;
     ``board_start_us`` when, on the timing board's counter. ``seed`` makes the noise. A ``black``
-    picture gets no light at all.
+    picture gets no light at all. ``capture`` counts captures: targets that are held up are
+    elsewhere in each. ``moved_mm`` and ``turned_deg``: how far the camera is from its place, in
+    its own axes.
     """
 
     camera: str
@@ -44,6 +47,9 @@ class Shot:
     board_start_us: float = 0.0
     seed: tuple[int, ...] = (0,)
     black: bool = False
+    capture: int = 0
+    moved_mm: Triple = (0.0, 0.0, 0.0)
+    turned_deg: Triple = (0.0, 0.0, 0.0)
 
 
 class Studio:
@@ -80,7 +86,7 @@ class Studio:
 
     def photograph(self, shot: Shot) -> Image:
         """Take one photograph: (H, W) or (H, W, 3) RGB, 8 or 16 bits."""
-        rig_camera = self._camera(shot.camera)
+        rig_camera = self._camera(shot)
         table = self._tables.of(rig_camera.camera)
         f_number = shot.f_number or rig_camera.camera.f_number
         reference = self.sensor.reference_f_number or rig_camera.camera.f_number
@@ -98,7 +104,7 @@ class Studio:
 
     def light(self, shot: Shot) -> Singles:
         """The light on the sensor before it is counted, (H, W, C), with defocus and motion."""
-        rig_camera = self._camera(shot.camera)
+        rig_camera = self._camera(shot)
         table = self._tables.of(rig_camera.camera)
         mono = shot.pixel_format.startswith("Mono")
         if shot.black:
@@ -124,7 +130,7 @@ class Studio:
         placement = placement_at(self.scene.motion, middle_s)
         head = None if self.head is None else self.head.view(rig_camera, placement)
         pose = rig_camera.pose
-        flats = [*self._still(), *self._board(shot)]
+        flats = [*self._shown(shot.capture), *self._board(shot)]
         views = [
             FlatView(
                 flat, rig_camera, card_light(flat.facing_rig, self.scene.lights, self.scene.ambient)
@@ -136,10 +142,14 @@ class Studio:
         )
         return View(backdrop, head, tuple(views))
 
-    def _still(self) -> tuple[Flat, ...]:
+    def _shown(self, capture: int) -> tuple[Flat, ...]:
+        """The targets where they are in a capture."""
         if self._targets is None:
             self._targets = tuple(target(settings) for settings in self.scene.targets)
-        return self._targets
+        return tuple(
+            flat if settings.held is None else held_up(flat, settings.held, capture)
+            for flat, settings in zip(self._targets, self.scene.targets, strict=True)
+        )
 
     def _board(self, shot: Shot) -> tuple[Flat, ...]:
         settings = self.scene.board
@@ -151,10 +161,11 @@ class Studio:
         shares = lit_shares(np.array(middle % 2.0**board.bits), np.array(length), board.bits)
         return (timing_board(board, settings.place, shares, settings.level),)
 
-    def _camera(self, name: str) -> RigCamera:
-        if name not in self.cameras:
-            raise NotFoundError("camera", f"there is no camera {name!r}", "give a name of the rig")
-        return self.cameras[name]
+    def _camera(self, shot: Shot) -> RigCamera:
+        if shot.camera not in self.cameras:
+            problem = f"there is no camera {shot.camera!r}"
+            raise NotFoundError("camera", problem, "give a name of the rig")
+        return knocked(self.cameras[shot.camera], shot.moved_mm, shot.turned_deg)
 
     def without_noise(self) -> Studio:
         """The same studio with sensors of a million times the wells and no read noise."""

@@ -35,6 +35,16 @@ def real_head() -> Scan:
     return read_scan(path)
 
 
+each_axes = pytest.mark.parametrize(
+    "axes",
+    [
+        pytest.param(a, id=f"{a.up}{a.front}", marks=[pytest.mark.slow] if k % 6 else [])
+        for k, a in enumerate(ALL_AXES)
+    ],
+)
+"""All 24; a sixth of them, with another axis up each, in every run."""
+
+
 def test_there_are_24_axes_and_each_is_a_rotation() -> None:
     assert len(ALL_AXES) == 24
     for axes in ALL_AXES:
@@ -43,7 +53,7 @@ def test_there_are_24_axes_and_each_is_a_rotation() -> None:
         assert axes.rotation_file_to_rig @ DIRECTIONS[axes.front] == pytest.approx([0, -1, 0])
 
 
-@pytest.mark.parametrize("axes", ALL_AXES, ids=lambda a: f"{a.up}{a.front}")
+@each_axes
 def test_axes_of_a_plain_head_are_found(axes: Axes) -> None:
     head = plain_head()
     samples = surface_samples(head.vertices @ axes.rotation_file_to_rig, head.faces)
@@ -51,7 +61,7 @@ def test_axes_of_a_plain_head_are_found(axes: Axes) -> None:
 
 
 @pytest.mark.real_scan
-@pytest.mark.parametrize("axes", ALL_AXES, ids=lambda a: f"{a.up}{a.front}")
+@each_axes
 def test_axes_and_units_of_the_real_head_are_found(tmp_path: Path, axes: Axes) -> None:
     upright = real_head()
     extension = "stl" if axes.up < axes.front else "obj"
@@ -122,7 +132,7 @@ def synthetic() -> Scan:
     return synthetic_head()
 
 
-@pytest.mark.parametrize("axes", ALL_AXES, ids=lambda a: f"{a.up}{a.front}")
+@each_axes
 def test_axes_of_the_synthetic_head_are_found(synthetic: Scan, axes: Axes) -> None:
     turned = synthetic.vertices_mm @ axes.rotation_file_to_rig
     assert infer_axes(surface_samples(turned, synthetic.faces))[0] == axes

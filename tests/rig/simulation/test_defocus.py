@@ -12,14 +12,8 @@ from geometry.camera import RigCamera
 from geometry.frames import Pose
 from geometry.optics import blur_disk_mm
 from rig.simulation.defocus import disk_kernel
-from rig.simulation.settings import (
-    BoardSettings,
-    HeadSettings,
-    PlaceSettings,
-    SceneSettings,
-    SensorSettings,
-    TargetSettings,
-)
+from rig.simulation.flatsettings import BoardSettings, PlaceSettings, TargetSettings
+from rig.simulation.settings import HeadSettings, SceneSettings, SensorSettings
 from rig.simulation.studio import Shot, Studio
 
 SHOT = Shot("cam01", 4000.0, pixel_format="Mono16")

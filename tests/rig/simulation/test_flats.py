@@ -12,14 +12,9 @@ from simulated_rigs import STRONG, lens, placed
 
 from geometry.camera import RigCamera
 from geometry.errors import InputError
-from rig.simulation.flats import Flat, target
-from rig.simulation.settings import (
-    HeadSettings,
-    PlaceSettings,
-    SceneSettings,
-    SensorSettings,
-    TargetSettings,
-)
+from rig.simulation.flats import Flat, held_up, target
+from rig.simulation.flatsettings import HeldSettings, PlaceSettings, TargetSettings
+from rig.simulation.settings import HeadSettings, SceneSettings, SensorSettings
 from rig.simulation.studio import Shot, Studio
 
 QUIET = SensorSettings(full_well_e=1e5, read_noise_e=1.0, depth_of_field=False)
@@ -172,3 +167,64 @@ def test_impossible_targets_are_refused(settings: TargetSettings, code: str) -> 
     with pytest.raises(InputError, match="give") as caught:
         target(settings)
     assert code in caught.value.code
+
+
+def charuco_file(folder: Path, px_per_square: int) -> Path:
+    """A ChArUco picture whose sides cannot be halved."""
+    board = cv2.aruco.CharucoBoard(
+        (9, 7), 20.0, 15.0, cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)
+    )
+    face = board.generateImage((9 * px_per_square, 7 * px_per_square))
+    path = folder / "plate.png"
+    cv2.imwrite(str(path), np.pad(face, ((24, 24), (24, 23)), constant_values=255))
+    return path
+
+
+def test_a_picture_seen_from_afar_keeps_its_size(tmp_path: Path) -> None:
+    path = charuco_file(tmp_path, 104)
+    width_px = 9 * 104 + 47
+    mm_per_px = 20.0 / 104
+    settings = TargetSettings(
+        "image", PlaceSettings((0.0, 0.0, 0.0)), width_px * mm_per_px, image=path, sharp=True
+    )
+    picture = Studio([CAMERA], scene(settings), QUIET).photograph(SHOT)
+    board = cv2.aruco.CharucoBoard(
+        (9, 7), 20.0, 15.0, cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)
+    )
+    grey = (picture >> 8).astype(np.uint8)
+    corners, numbers, _, _ = cv2.aruco.CharucoDetector(board).detectBoard(grey)
+    assert len(corners) == 48
+    flat = target(settings)
+    assert flat.albedo[0].ndim == 2  # a grey picture needs one channel
+    plate = board.getChessboardCorners()[np.ravel(numbers), :2] - [90.0, 70.0]
+    # The picture has one column less on its right: its middle is half a pixel left of the plate's.
+    place = settings.place.position_rig_mm + np.array([1.0, 0.0, 0.0]) * mm_per_px / 2.0
+    points = place + plate[:, :1] * flat.right_rig + plate[:, 1:] * flat.down_rig
+    off = corners.reshape(-1, 2) - by_opencv(CAMERA, points)
+    # 48 corners at 0.05 px each: their mean is known to 0.01 px, their scale over 500 px to 3e-5.
+    assert np.abs(off.mean(axis=0)).max() < 0.05
+    spread = corners.reshape(-1, 2) - corners.reshape(-1, 2).mean(axis=0)
+    assert abs((off * spread).sum() / (spread**2).sum()) < 1e-4
+
+
+def test_a_held_target_is_elsewhere_in_each_capture_and_still_within_one() -> None:
+    held = HeldSettings((30.0, 20.0, 10.0), tilt_deg=25.0, roll_deg=90.0, seed=4)
+    settings = TargetSettings("charuco", PlaceSettings((5.0, 6.0, 7.0)), 20.0, held=held)
+    flat = target(settings)
+    flat_axes = np.stack([flat.right_rig, flat.down_rig, flat.facing_rig])
+    shown = [held_up(flat, held, capture) for capture in range(1, 200)]
+    shifts = np.array([s.centre_rig_mm for s in shown]) - [5.0, 6.0, 7.0]
+    assert (np.abs(shifts) <= [30.0, 20.0, 10.0]).all()
+    assert (np.abs(shifts).max(axis=0) > [27.0, 18.0, 9.0]).all()
+    tilts = np.degrees([np.arccos(s.facing_rig @ flat.facing_rig) for s in shown])
+    assert 20.0 < tilts.max() <= 25.0
+    for s in shown:
+        axes = np.stack([s.right_rig, s.down_rig, s.facing_rig])
+        assert np.allclose(axes @ axes.T, np.eye(3))
+        assert np.linalg.det(axes) == pytest.approx(np.linalg.det(flat_axes))
+    assert np.array_equal(held_up(flat, held, 7).centre_rig_mm, shown[6].centre_rig_mm)
+
+    studio = Studio([CAMERA], scene(settings), QUIET)
+    first, again, next_ = (studio.photograph(replace(SHOT, capture=n)) for n in (1, 1, 2))
+    assert np.array_equal(first, again)
+    assert not np.array_equal(first, next_)

@@ -18,14 +18,9 @@ from geometry.errors import DeviceError, InputError
 from rig.cameras.base import ArmSpec, CameraSettings, Frame, FrameStatus, TriggerKind
 from rig.simulation.backend import SimulatedBackend
 from rig.simulation.faults import CameraFaults
-from rig.simulation.settings import (
-    BoardSettings,
-    LightSettings,
-    PlaceSettings,
-    SceneSettings,
-    SensorSettings,
-    SimulationSettings,
-)
+from rig.simulation.flatsettings import BoardSettings, PlaceSettings, TargetSettings
+from rig.simulation.motion import knocked, rotation_by
+from rig.simulation.settings import LightSettings, SceneSettings, SensorSettings, SimulationSettings
 from rig.timingboard.reading import read_board
 from rig.trigger.box import FireReport
 
@@ -316,6 +311,24 @@ def test_a_timestamp_reset_shows_in_the_stamps_and_in_the_clock(backend_of: Make
     assert stamps[0] > stamps[2] or stamps[0] < 0
     (sample,) = backend.open("cam02").clock_samples(1)
     assert 41_000_000 < sample.device_ns < 60_000_000_000
+
+
+def test_a_knocked_camera_stands_elsewhere_from_that_shot_on(backend_of: Maker) -> None:
+    card = TargetSettings("charuco", PlaceSettings((0.0, 0.0, 0.0)), 30.0)
+    there = SceneSettings(with_head=False, targets=(card,))
+    moved, turned = (3.0, -2.0, 5.0), (0.4, -0.3, 1.0)
+    faults = CameraFaults(moved_mm=moved, turned_deg=turned, knocked_at_shot=2)
+    one, other = backend_of(faults, scene=there), backend_of(scene=there)
+    for number in (1, 2):
+        shaken, still = (capture(b, number)[1] for b in (one, other))
+        for name in ("cam01", "cam02", "cam03"):
+            same = np.array_equal(shaken[name][0].pixels, still[name][0].pixels)
+            assert same == (name != "cam02" or number == 1)
+    place = knocked(RIG[1], moved, turned)
+    corner = np.array([[10.0, 20.0, 30.0]])
+    # What stood at the corner before the camera's eye stands there still, seen from elsewhere.
+    seen = RIG[1].pose.to_camera(corner) - moved
+    assert np.allclose(place.pose.to_camera(corner), seen @ rotation_by(np.radians(turned)))
 
 
 def test_an_unplugged_camera_is_gone_until_it_is_plugged_in_again(backend_of: Maker) -> None:

@@ -10,7 +10,8 @@ import pytest
 from simulated_rigs import STRONG, lens, placed
 
 from geometry.errors import InputError
-from rig.simulation.settings import BoardSettings, PlaceSettings, SceneSettings, SensorSettings
+from rig.simulation.flatsettings import BoardSettings, PlaceSettings
+from rig.simulation.settings import SceneSettings, SensorSettings
 from rig.simulation.studio import Shot, Studio
 from rig.timingboard.reading import TimingBoard, linear_light, read_board
 
