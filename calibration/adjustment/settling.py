@@ -1,0 +1,89 @@
+"""After an adjustment: which image points are blunders, and how good the others really are."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.stats import chi2
+
+from calibration.adjustment.components import Component, image_components
+from calibration.adjustment.levenberg import Solution
+from calibration.adjustment.network import Network
+from calibration.adjustment.options import CalibrationOptions
+from calibration.adjustment.reliability import Reliability
+from geometry.arrays import Bools, Floats
+
+BLUNDER_CHANCE = 0.01
+"""Chance that a set of good observations loses one of them to the test."""
+
+MOST_LOST = 0.25
+"""A camera whose model is wrong would lose its border; it may lose no more than this share."""
+
+OWN_FACTOR = 1.1
+"""A camera gets a sigma of its own when it differs from the others by this, and not by chance."""
+
+
+def settle(
+    solution: Solution, network: Network, found: Reliability, options: CalibrationOptions
+) -> tuple[Bools, Floats]:
+    """Blunders (n,), and factors (cameras,) by which stated sigmas are to be changed."""
+    count = network.camera_count
+    bad = np.zeros(len(found.t), bool)
+    if options.reject:
+        bad = _blunders(network, found, options.rescale)
+    if not options.rescale:
+        return bad, np.ones(count)
+    good = np.where(bad, 0.0, solution.weights)
+    whole, *each = image_components(_weighted(solution, good), network, _kept(found, ~bad))
+    common = whole.factor if whole.significant else 1.0
+    return bad, np.array([_factor(c, common) for c in each])
+
+
+def _factor(own: Component, common: float) -> float:
+    relative = own.factor / common
+    scatter = np.sqrt(2.0 / max(own.redundancy, 1.0))
+    if abs(relative**2 - 1.0) > 3.0 * scatter and max(relative, 1.0 / relative) > OWN_FACTOR:
+        return own.factor
+    return common
+
+
+def _weighted(solution: Solution, weights: Floats) -> Solution:
+    return Solution(
+        solution.state,
+        solution.partials,
+        solution.residuals,
+        weights,
+        solution.reduction,
+        solution.cost,
+        solution.iterations,
+        solution.stop,
+    )
+
+
+def _kept(found: Reliability, good: Bools) -> Reliability:
+    return Reliability(found.redundancy * good[:, None], found.w, found.t)
+
+
+def _blunders(network: Network, found: Reliability, rescale: bool) -> Bools:
+    """Points that fail the test, the worst of each target at a place first.
+
+    A blunder also spoils the residuals of the other images of its target: those must wait for
+    the next adjustment, which goes without it.
+    """
+    t = found.t.copy()
+    rows = network.camera_rows
+    if rescale:
+        for k in range(network.camera_count):
+            own = slice(rows[k], rows[k + 1])
+            if rows[k + 1] > rows[k]:
+                # The median of chi-square with two degrees of freedom is 2 log 2.
+                t[own] /= max(1.0, float(np.median(t[own])) / (2.0 * np.log(2.0)))
+    bad = t > chi2.isf(BLUNDER_CHANCE / max(len(t), 1), 2)
+    key = network.sight.pose * network.target_count + network.sight.target
+    worst = np.zeros(int(key.max(initial=0)) + 1)
+    np.maximum.at(worst, key, t)
+    bad &= t >= worst[key]
+    for k in range(network.camera_count):
+        own = slice(rows[k], rows[k + 1])
+        if bad[own].sum() > MOST_LOST * (rows[k + 1] - rows[k]):
+            bad[own] = False
+    return bad
