@@ -128,7 +128,7 @@ class Scene:
         place = self.places[carrier][0 if fixed else frame]
         if not fixed:
             place = self.seen_otherwise.get((camera, frame), place)
-        return own @ place.rotation.T + place.shift_mm
+        return np.asarray(own @ place.rotation.T + place.shift_mm)
 
     def observe(self, sigma_px: float, seed: int | np.random.Generator) -> Observations:
         """Image points of all targets that are in frame and face the camera."""
@@ -162,7 +162,9 @@ class Scene:
                     good = _in_frame(image, camera) & self._facing(c, k, frame)
                     number = np.flatnonzero(good)
                     rows.append(
-                        np.c_[np.full(len(number), c), np.full(len(number), frame), first[k] + number]
+                        np.c_[
+                            np.full(len(number), c), np.full(len(number), frame), first[k] + number
+                        ]
                     )
                     pixels.append(image[good])
         return np.concatenate(rows).astype(np.int64), np.concatenate(pixels)
@@ -174,7 +176,7 @@ class Scene:
         place = self.places[carrier][frame]
         away = place.shift_mm - self.cameras[camera].pose.position_rig_mm
         cosine = float(place.rotation[:, 2] @ away / np.linalg.norm(away))
-        return cosine > np.cos(np.radians(65.0))
+        return cosine > float(np.cos(np.radians(65.0)))
 
     def with_cameras(self, cameras: tuple[CalibratedCamera, ...]) -> Scene:
         """The same scene with other cameras."""

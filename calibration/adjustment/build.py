@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calibration.adjustment.camera import CalibratedCamera
+from calibration.adjustment.finite import finite_rows
 from calibration.adjustment.model import Sight
 from calibration.adjustment.network import Lengths, Network, Priors
 from calibration.adjustment.options import CalibrationOptions
@@ -44,12 +45,10 @@ def camera_poses(cameras: tuple[CalibratedCamera, ...]) -> dict[int, Placed]:
     }
 
 
-def usable_rows(
-    observations: Observations, placements: Placements, placing: Placing
-) -> Bools:
+def usable_rows(observations: Observations, placements: Placements, placing: Placing) -> Bools:
     """Rows that can be adjusted: their carrier has a place and their target coordinates."""
     placed = np.array([p is not None for p in placing.placed])
-    known = np.isfinite(placing.target_mm).all(axis=1)
+    known = finite_rows(placing.target_mm)
     sigma = np.concatenate([c.sigma_mm for c in observations.targets.carriers])
     open_target = np.isinf(sigma).any(axis=1)
     rows = placed[placements.of_row] & known[observations.target]
@@ -58,7 +57,7 @@ def usable_rows(
     rays = np.bincount(np.unique(pairs[rows], axis=0)[:, 0], minlength=len(known))
     rows &= ~open_target[observations.target] | (rays[observations.target] >= 2)
     counts = np.bincount(placements.of_row[rows], minlength=len(placed))
-    return rows & (counts[placements.of_row] >= 3)
+    return np.asarray(rows & (counts[placements.of_row] >= 3))
 
 
 def build(
@@ -137,7 +136,7 @@ def _pose_sigma(
     out[np.setdiff1d(np.arange(len(out)), sight.pose)] = 0.0
     for k, carrier in enumerate(observations.targets.carriers):
         places = np.intersect1d(np.flatnonzero(placements.carrier == k), sight.pose)
-        own = (carrier_of == k) & np.isfinite(placing.target_mm).all(axis=1)
+        own = (carrier_of == k) & finite_rows(placing.target_mm)
         if spread_rank(placing.target_mm[own]) < 2:
             out[places, 3:] = LOOSE_TURN_RAD
         if len(places) and np.isinf(carrier.sigma_mm).any(axis=1).all():
@@ -161,13 +160,9 @@ def _lengths(observations: Observations, seen: Bools) -> Lengths:
     )
 
 
-def _scale_source(
-    observations: Observations, lengths: Lengths, options: CalibrationOptions
-) -> str:
+def _scale_source(observations: Observations, lengths: Lengths, options: CalibrationOptions) -> str:
     """Where the size of everything comes from."""
-    nominal = any(
-        np.isfinite(c.sigma_mm).all(axis=1).sum() >= 2 for c in observations.targets.carriers
-    )
+    nominal = any(finite_rows(c.sigma_mm).sum() >= 2 for c in observations.targets.carriers)
     if len(lengths.length_mm) and nominal:
         return "distances and nominal coordinates"
     if len(lengths.length_mm):

@@ -11,6 +11,7 @@ from calibration.adjustment.camera import INTERIOR_NAMES, CalibratedCamera
 from calibration.adjustment.components import image_components, prior_components
 from calibration.adjustment.covariance import Covariance
 from calibration.adjustment.crossvalidation import cross_validate
+from calibration.adjustment.finite import finite_rows
 from calibration.adjustment.inspection import inspect
 from calibration.adjustment.levenberg import LossOptions, Solution, Stop, adjust
 from calibration.adjustment.network import Network
@@ -82,9 +83,7 @@ def calibrate(
             f"the images do not determine the calibration: {error}",
             "add images with the plate nearer, farther and tilted, or fix parameters of the model",
         ) from error
-    must_be_plausible(
-        observations, done.network, done.solution, done.covariance, options
-    )
+    must_be_plausible(observations, done.network, done.solution, done.covariance, options)
     return _result(observations, options, done)
 
 
@@ -144,9 +143,9 @@ def _result(
     sizes = tuple((int(w), int(h)) for w, h in observations.image_size_px)
     cameras = solution.state.cameras(observations.cameras, sizes)
     seen = np.bincount(network.sight.target, minlength=network.target_count) > 0
-    seen |= np.isfinite(network.priors.target_sigma).all(axis=1) & (
-        network.priors.target_sigma > 0.0
-    ).any(axis=1)
+    seen |= finite_rows(network.priors.target_sigma) & (network.priors.target_sigma > 0.0).any(
+        axis=1
+    )
     return Calibration(
         cameras,
         observations.targets,

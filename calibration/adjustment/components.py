@@ -48,7 +48,10 @@ def image_components(
     squares = solution.weights[:, None] * (solution.residuals.pixel / network.sigma_px) ** 2
     rows = network.camera_rows
     parts = [("images", slice(None))]
-    parts += [(f"images/{name}", slice(rows[k], rows[k + 1])) for k, name in enumerate(network.camera_names)]
+    parts += [
+        (f"images/{name}", slice(rows[k], rows[k + 1]))
+        for k, name in enumerate(network.camera_names)
+    ]
     return tuple(_component(name, squares[p], found.redundancy[p]) for name, p in parts)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from calibration.adjustment.finite import finite_rows
 from calibration.adjustment.start.views import Placements, View, is_planar, views_of
 from calibration.observations import Observations
 from geometry.arrays import Floats
@@ -78,7 +79,7 @@ def _one_side(observations: Observations) -> None:
 def _side(view: View, observations: Observations, nominal: Floats) -> float:
     """+1 or -1: which side of a plate a view shows; 0 for what is not a plate."""
     points = nominal[observations.target[view.rows]]
-    points = points[np.isfinite(points).all(axis=1)]
+    points = points[finite_rows(points)]
     if len(points) < 4 or len(points) < len(view.rows) or not is_planar(points):
         return 0.0
     centred = points - points.mean(axis=0)
@@ -90,4 +91,3 @@ def _side(view: View, observations: Observations, nominal: Floats) -> float:
     pixels = observations.pixel[view.rows]
     affine = np.linalg.lstsq(centred @ axes.T, pixels - pixels.mean(axis=0), rcond=None)[0]
     return float(np.sign(np.linalg.det(affine)))
-

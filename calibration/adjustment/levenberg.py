@@ -59,7 +59,7 @@ class Solution:
 def misfits(found: Residuals, network: Network) -> Floats:
     """Length of each image point's residual in sigmas, (n,)."""
     scaled = found.pixel / network.sigma_px
-    return np.sqrt(np.einsum("na,na->n", scaled, scaled))
+    return np.asarray(np.sqrt(np.einsum("na,na->n", scaled, scaled)))
 
 
 def huber_cost(misfit: Floats, limit: float) -> float:

@@ -39,9 +39,7 @@ class Lengths:
     sigma_mm: Floats
 
 
-NO_LENGTHS = Lengths(
-    np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0), np.empty(0)
-)
+NO_LENGTHS = Lengths(np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0), np.empty(0))
 
 
 @dataclass(frozen=True, eq=False)

@@ -194,11 +194,14 @@ class Assembler:
     @staticmethod
     def _sum(places: Ints, values: Floats, shape: tuple[int, ...]) -> Floats:
         size = int(np.prod(shape))
-        return np.bincount(places, values.ravel(), minlength=size).reshape(shape)
+        sums = np.bincount(places, values.ravel(), minlength=size)
+        return np.asarray(sums, np.float64).reshape(shape)
 
     def _add_priors(self, normals: Normals, found: Residuals) -> None:
         network, priors = self._network, self._network.priors
-        weight = np.concatenate([_weights(priors.interior_sigma), _weights(priors.exterior_sigma)], 1)
+        weight = np.concatenate(
+            [_weights(priors.interior_sigma), _weights(priors.exterior_sigma)], 1
+        )
         misfit = np.concatenate([found.interior, found.exterior], axis=1)
         count, o = network.core_count, self._offset
         diagonal = np.concatenate([weight.ravel(), _weights(network.pose_sigma).ravel()])

@@ -25,13 +25,18 @@ RADIAL_SHARE = (0.3, 0.3, 0.1)
 
 TANGENTIAL_SHARE = 0.01
 
+NARROW = 0.35
+"""Lenses whose corners are nearer to the axis than this (tangent; 19 degrees) need no k3: it could
+not be told from k2 (correlation 0.99)."""
+
 
 @dataclass(frozen=True)
 class InteriorModel:
     """Sigma of each interior parameter about its start: 0 fixed, infinity free, else a prior.
 
     None takes a wide prior that only binds where images say nothing: the middle of the image for
-    ``cx`` and ``cy``, no distortion for the others. f and b1 are in px and without unit.
+    ``cx`` and ``cy``, no distortion for the others; k3 of narrow lenses is then fixed. f is in px,
+    b1 without unit.
     """
 
     f: float = FREE
@@ -62,7 +67,7 @@ class InteriorModel:
             "cy": middle,
             "k1": RADIAL_SHARE[0] / radius**2,
             "k2": RADIAL_SHARE[1] / radius**4,
-            "k3": RADIAL_SHARE[2] / radius**6,
+            "k3": RADIAL_SHARE[2] / radius**6 if radius > NARROW else FIXED,
             "p1": TANGENTIAL_SHARE / radius,
             "p2": TANGENTIAL_SHARE / radius,
         }
@@ -90,10 +95,11 @@ class ReferencePoses:
 class CalibrationOptions:
     """``start`` holds cameras near the truth, such as a design's, by the observations' names.
 
-    ``interiors`` gives interior orientations alone, where poses are not known at all. ``model`` serves all cameras but those named in ``models``. ``reference_poses`` makes the
-    start's poses observations and so the datum; without it the network is free.
-    ``rescale``: whether the stated sigmas of image points may be corrected by what the residuals
-    show. ``reject``: whether image points that fail Baarda's test are left out.
+    ``interiors`` gives interior orientations alone, where poses are not known at all. ``model``
+    serves all cameras but those named in ``models``. ``reference_poses`` makes the start's poses
+    observations and so the datum; without it the network is free. ``rescale``: whether the stated
+    sigmas of image points may be corrected by what the residuals show. ``reject``: whether image
+    points that fail Baarda's test are left out.
     """
 
     start: tuple[CalibratedCamera, ...] = ()

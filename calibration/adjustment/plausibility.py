@@ -7,6 +7,7 @@ import numpy as np
 from calibration.adjustment.build import camera_poses
 from calibration.adjustment.covariance import Covariance
 from calibration.adjustment.datum import reach_mm
+from calibration.adjustment.finite import finite_rows
 from calibration.adjustment.levenberg import Solution
 from calibration.adjustment.network import Network
 from calibration.adjustment.options import CalibrationOptions
@@ -65,7 +66,7 @@ def _unit(ratio: float) -> str:
 def _lengths(observations: Observations, network: Network, solution: Solution) -> None:
     lengths = network.lengths
     ids = observations.targets.ids
-    nominal = np.isfinite(network.priors.target_sigma).all(axis=1)
+    nominal = finite_rows(network.priors.target_sigma)
     for k, length in enumerate(lengths.length_mm):
         a, b = int(lengths.first[k]), int(lengths.second[k])
         target = network.priors.target

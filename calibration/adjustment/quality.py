@@ -9,7 +9,6 @@ import numpy as np
 from calibration.adjustment.camera import (
     INTERIOR,
     INTERIOR_NAMES,
-    PER_CAMERA,
     POSE_NAMES,
     CalibratedCamera,
 )
@@ -18,6 +17,7 @@ from calibration.adjustment.covariance import Covariance
 from calibration.adjustment.levenberg import Solution
 from calibration.adjustment.network import Network
 from calibration.adjustment.reliability import Reliability
+from calibration.adjustment.residualgrid import residual_grid
 from calibration.adjustment.result import CameraQuality, Correlation, CrossValidation, WeakParameter
 
 WEAK_PRIOR_SHARE = 0.5
@@ -67,10 +67,13 @@ def _camera_row(judged: Judged, k: int) -> CameraQuality:
         float(np.sqrt(np.mean(sigma[1:3] ** 2))),
         float(np.sqrt(np.mean(sigma[INTERIOR : INTERIOR + 3] ** 2))),
         float(np.degrees(np.sqrt(np.mean(sigma[INTERIOR + 3 :] ** 2)))),
+        residual_grid(network.pixel[rows], v, camera.image_size_px),
     )
 
 
-def _coverage(pixels: np.ndarray[tuple[int, int], np.dtype[np.float64]], size: tuple[int, int]) -> float:
+def _coverage(
+    pixels: np.ndarray[tuple[int, int], np.dtype[np.float64]], size: tuple[int, int]
+) -> float:
     cells = np.clip(((pixels + 0.5) / np.array(size) * GRID).astype(int), 0, GRID - 1)
     return len(np.unique(cells, axis=0)) / GRID**2
 
@@ -97,10 +100,8 @@ def correlations(judged: Judged) -> tuple[Correlation, ...]:
         scale = np.sqrt(np.maximum(np.diag(block), 0.0))
         safe = np.where(scale > 0.0, scale, np.inf)
         value = block / np.outer(safe, safe)
-        for a in range(PER_CAMERA):
-            for b in range(a + 1, PER_CAMERA):
-                if abs(value[a, b]) > STRONG_CORRELATION:
-                    out.append(Correlation(camera.name, names[a], names[b], float(value[a, b])))
+        strong = np.argwhere(np.triu(np.abs(value) > STRONG_CORRELATION, 1))
+        out += [Correlation(camera.name, names[a], names[b], float(value[a, b])) for a, b in strong]
     return tuple(out)
 
 

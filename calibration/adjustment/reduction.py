@@ -91,7 +91,7 @@ class Reduction:
         self._right = system.core_right, system.right
         taken = system.blocks * (1.0 + damping * np.eye(3))
         try:
-            self._inverse = np.linalg.inv(taken)
+            self._inverse: Floats = np.asarray(np.linalg.inv(taken), np.float64)
         except np.linalg.LinAlgError as error:
             raise SingularError("a target is not determined") from error
         cross = np.swapaxes(system.cross, 0, 1)

@@ -10,7 +10,7 @@ from calibration.adjustment.camera import PER_CAMERA
 from calibration.adjustment.covariance import Covariance
 from calibration.adjustment.levenberg import Solution
 from calibration.adjustment.network import Network
-from geometry.arrays import Floats
+from geometry.arrays import Floats, Ints
 
 CHUNK = 4096
 DELTA0 = 4.13
@@ -54,7 +54,7 @@ def _fitted_covariance(solution: Solution, covariance: Covariance, network: Netw
     return out
 
 
-def _add(line: Floats, block: Floats, first: Floats, width: int) -> None:
+def _add(line: Floats, block: Floats, first: Ints, width: int) -> None:
     columns = first[:, None] + np.arange(width)
     number = np.arange(len(line))
     for axis in range(2):

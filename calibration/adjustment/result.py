@@ -11,7 +11,8 @@ from calibration.adjustment.components import Component
 from calibration.adjustment.covariance import Covariance
 from calibration.adjustment.levenberg import Stop
 from calibration.adjustment.reliability import Reliability
-from calibration.observations import Observations, TargetSet
+from calibration.adjustment.residualgrid import GridCell
+from calibration.observations import TargetSet
 from geometry.arrays import Floats, Ints, frozen
 
 
@@ -37,6 +38,7 @@ class CameraQuality:
     ``redundancy`` mean of its redundancy numbers; ``coverage`` share of a 5 x 5 grid of the image
     with points in it. ``focal_sigma_px``, ``centre_sigma_px`` (principal point),
     ``position_sigma_mm``, ``rotation_sigma_deg``: root mean squares of their axes, 1 sigma.
+    ``grid``: residuals over the image.
     """
 
     name: str
@@ -51,6 +53,7 @@ class CameraQuality:
     centre_sigma_px: float
     position_sigma_mm: float
     rotation_sigma_deg: float
+    grid: tuple[GridCell, ...]
 
 
 @dataclass(frozen=True)
@@ -113,8 +116,11 @@ class CalibrationQuality:
 
 @dataclass(frozen=True, eq=False)
 class ResidualTable:
-    """Of each image point used: its row in the observations (n,), residual (n, 2) px observed
-    less computed, and its reliability. ``rejected`` (r,) are rows that failed their test."""
+    """What each image point says.
+
+    ``rows`` (n,) in the observations, ``residual_px`` (n, 2) observed less computed, and its
+    reliability. ``rejected`` (r,) are rows that failed their test.
+    """
 
     rows: Ints
     residual_px: Floats
@@ -164,4 +170,3 @@ class Calibration:
         rows[0, b], rows[0, a] = way / length, -way / length
         nothing = np.zeros((1, PER_CAMERA * len(self.cameras)))
         return length, float(np.sqrt(self.covariance.of_functions(nothing, rows)[0, 0]))
-

@@ -8,7 +8,7 @@ import numpy as np
 
 from calibration.adjustment.camera import INTERIOR, PER_CAMERA, CalibratedCamera, Interior
 from calibration.adjustment.rotations import nearest_rotation, rotation_of
-from geometry.arrays import Floats
+from geometry.arrays import Floats, Ints
 from geometry.frames import Pose
 
 
@@ -42,10 +42,10 @@ class State:
             self.target + target,
         )
 
-    def points_rig_mm(self, pose: object, target: object) -> Floats:
+    def points_rig_mm(self, pose: Ints, target: Ints) -> Floats:
         """Targets in the rig frame (n, 3); ``pose`` and ``target`` (n,) index carriers, targets."""
-        turned = np.einsum("nij,nj->ni", self.attitude[pose], self.target[target])  # type: ignore[index]
-        return np.asarray(turned + self.position[pose])  # type: ignore[index]
+        turned = np.einsum("nij,nj->ni", self.attitude[pose], self.target[target])
+        return np.asarray(turned + self.position[pose])
 
     def cameras(
         self, names: tuple[str, ...], sizes_px: tuple[tuple[int, int], ...]

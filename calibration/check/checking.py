@@ -9,7 +9,7 @@ import numpy as np
 from calibration.adjustment.result import Calibration
 from calibration.check import words
 from calibration.check.diagnosis import Diagnosis, diagnose
-from calibration.check.effects import Effects, effects
+from calibration.check.effects import effects
 from calibration.check.epoch import Epoch, epoch_of
 from calibration.check.findings import findings, scale_estimate
 from calibration.check.gross import Righted, put_right
@@ -91,7 +91,7 @@ def judge(
     noise = noise_of(diagnosis)
     alarms = findings(righted, diagnosis, found)
     cameras = camera_checks(diagnosis, found, noise, options.hidden_limit_mm)
-    told = verdicts(alarms, cameras, noise, diagnosis, options)
+    told = verdicts(alarms, cameras, noise, diagnosis)
     scale, scale_sigma = _scale(diagnosis)
     distances = reference.targets.distances or observations.targets.distances
     residual = diagnosis.first.v * _sigmas(diagnosis)
@@ -140,7 +140,6 @@ def verdicts(
     cameras: tuple[CameraCheck, ...],
     noise: Noise,
     diagnosis: Diagnosis,
-    options: CheckOptions,
 ) -> tuple[Finding, ...]:
     """Alarms, then doubts; or that all is fine."""
     told = list(alarms)
@@ -164,6 +163,7 @@ def verdicts(
     told += _doubts(cameras)
     if not told:
         hidden = max(c.sensitivity.hidden_mm for c in cameras if c.sensitivity)
+        hidden *= power95_factor(diagnosis)
         told.append(Finding(Kind.FINE, names, words.fine(len(names), hidden), effect_mm=hidden))
     return tuple(told)
 
@@ -187,11 +187,13 @@ def _notes(epoch: Epoch, diagnosis: Diagnosis, reference: Calibration) -> tuple[
     if diagnosis.outliers:
         out.append(f"{diagnosis.outliers} image points were left out as single blunders.")
     if epoch.unknown_rows:
-        out.append(f"{epoch.unknown_rows} image points of targets unknown to the reference were left out.")
-    for row in carrier_checks(diagnosis, reference, ()):
-        if row.shift_mm > SHIFT_NOTE_MM:
-            out.append(
-                f"{row.name} stands {words.length(row.shift_mm)} from where it stood before the "
-                "same cameras; that does no harm."
-            )
+        out.append(
+            f"{epoch.unknown_rows} image points of targets unknown to the reference were left out."
+        )
+    out += [
+        f"{row.name} stands {words.length(row.shift_mm)} from where it stood before the same "
+        "cameras; that does no harm."
+        for row in carrier_checks(diagnosis, reference, ())
+        if row.shift_mm > SHIFT_NOTE_MM
+    ]
     return tuple(out)

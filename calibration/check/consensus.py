@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calibration.adjustment.camera import Interior
+from calibration.adjustment.finite import finite_rows
 from calibration.adjustment.model import project
 from calibration.adjustment.rotations import similarity
 from calibration.adjustment.start.rays import nearest_points
@@ -22,8 +23,11 @@ FLOOR_PX = 0.5
 
 @dataclass(frozen=True, eq=False)
 class Consensus:
-    """``state`` with carriers placed; ``found_mm`` (places, m, 3) targets in the rig frame, NaN
-    unseen; ``scale`` (places,) of each carrier against the reference, NaN where unknown."""
+    """What most of the cameras agree on.
+
+    ``state`` has the carriers placed; ``found_mm`` (places, m, 3) are targets in the rig frame,
+    NaN unseen; ``scale`` (places,) of each carrier against the reference, NaN where unknown.
+    """
 
     state: State
     found_mm: Floats
@@ -87,7 +91,7 @@ def _miss_px(arms: Floats, ways: Floats, focal_px: Floats) -> Floats:
 def _placed(epoch: Epoch, found: Floats, place: int) -> tuple[float, Floats, Floats]:
     """Scale, attitude and position of one carrier, least moved by targets that do not fit."""
     own = epoch.target_carrier == epoch.place_carrier[place]
-    own &= np.isfinite(found[place]).all(axis=1)
+    own &= finite_rows(found[place])
     source, target = epoch.reference.target[own], found[place][own]
     if len(source) < 2:
         return np.nan, np.eye(3), target.mean(axis=0) if len(target) else np.zeros(3)
@@ -112,5 +116,8 @@ def by_camera(epoch: Epoch, off: Floats) -> Floats:
     """Median misfit (n,) of each camera; 0 for those that saw nothing."""
     count = len(epoch.camera_names)
     return np.array(
-        [np.median(off[epoch.camera == k]) if (epoch.camera == k).any() else 0.0 for k in range(count)]
+        [
+            np.median(off[epoch.camera == k]) if (epoch.camera == k).any() else 0.0
+            for k in range(count)
+        ]
     )

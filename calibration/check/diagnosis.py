@@ -13,12 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
+from calibration.adjustment.state import State
 from calibration.check.epoch import Epoch
 from calibration.check.fit import Fit, fit, refit
 from calibration.check.hypotheses import ALPHA, Cause, Hypothesis, hypotheses, log_tail
 from calibration.check.linear import Columns, Linear
 from calibration.check.scores import Outcomes, ScoreTests, estimate
-from calibration.adjustment.state import State
 from geometry.arrays import Bools, Floats, Ints
 
 MOST_CAUSES = 16
@@ -49,8 +49,11 @@ class Prepared:
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
-    """``first``: fit, tests and their outcomes with nothing changed; ``last``: the fit with all
-    ``accepted`` causes free. ``epoch`` is without the ``outliers`` rows (of the given one)."""
+    """What was found.
+
+    ``first``: fit, tests and their outcomes with nothing changed; ``last``: the fit with all
+    ``accepted`` causes free. ``epoch`` is without the ``outliers`` rows (of the given one).
+    """
 
     epoch: Epoch
     first: Fit
@@ -126,8 +129,11 @@ def _suspected(
 
 
 def _is_lens(by_pose: float, by_lens: float, by_both: float) -> bool:
-    """Through a long lens a turn and a shift of the principal point look alike, so the lens is
-    blamed only when a movement does not explain the images and a change of the lens does."""
+    """Whether the lens is to blame rather than the camera's place.
+
+    Through a long lens a turn and a shift of the principal point look alike, so the lens is
+    blamed only when a movement does not explain the images and a change of the lens does.
+    """
     return log_tail(by_both - by_pose, 3) < np.log(ALPHA) and by_lens > by_pose
 
 
@@ -160,7 +166,12 @@ def _lonely(epoch: Epoch, t: Floats, limit: float) -> Bools:
     bad &= t >= worst[epoch.points]
     # A cause that touches a whole camera, view or target is a finding and no blunder.
     for group in (epoch.view, epoch.target):
-        middle = np.array([np.median(t[group == k]) if (group == k).any() else 0.0 for k in range(int(group.max()) + 1)])
+        middle = np.array(
+            [
+                np.median(t[group == k]) if (group == k).any() else 0.0
+                for k in range(int(group.max()) + 1)
+            ]
+        )
         bad &= t > 25.0 * np.maximum(middle[group], 1.0) / 2.0
     return bad
 
@@ -220,9 +231,7 @@ def _statistic(causes: list[Hypothesis], last: Fit) -> float:
     return float((right / scale) @ inverse @ (right / scale))
 
 
-def _best_cameras(
-    accepted: list[Hypothesis], tests: ScoreTests, first: Fit
-) -> list[Hypothesis]:
+def _best_cameras(accepted: list[Hypothesis], tests: ScoreTests, first: Fit) -> list[Hypothesis]:
     """The accepted cameras, exchanged for another set of as many when that explains more."""
     moved = [h for h in accepted if h.cause is Cause.POSE]
     others = [h for h in accepted if h.cause is not Cause.POSE]

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from calibration.adjustment.finite import finite_rows
 from calibration.adjustment.result import Calibration
 from calibration.adjustment.start.views import Placements
 from calibration.check.reference import Reference
@@ -29,6 +30,7 @@ class Epoch:
 
     reference: Reference
     camera_names: tuple[str, ...]
+    image_size_px: tuple[tuple[int, int], ...]
     carrier_names: tuple[str, ...]
     target_names: tuple[str, ...]
     frame_names: tuple[str, ...]
@@ -98,6 +100,7 @@ def epoch_of(calibration: Calibration, observations: Observations) -> Epoch:
     return Epoch(
         Reference.of(calibration, index),
         tuple(c.name for c in calibration.cameras),
+        tuple(c.image_size_px for c in calibration.cameras),
         tuple(c.name for c in seen.targets.carriers),
         tuple(names[int(k)] for k in index),
         observations.frames,
@@ -151,7 +154,7 @@ def _targets(calibration: Calibration, observations: Observations) -> tuple[Ints
     """The reference's index of each target, and whether it has one with coordinates."""
     known = {name: k for k, name in enumerate(calibration.targets.ids)}
     index = np.array([known.get(name, -1) for name in observations.targets.ids])
-    there = np.isfinite(calibration.target_mm).all(axis=1)
+    there = finite_rows(calibration.target_mm)
     return index, (index >= 0) & there[index]
 
 

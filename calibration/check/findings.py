@@ -153,7 +153,8 @@ def _camera(one: Change, diagnosis: Diagnosis, found: Effects) -> Finding:
     names = diagnosis.epoch.camera_names
     px, mm = found.of(camera, one.change, INTERIOR)
     rivals, tied = _rivals(one, diagnosis)
-    kind, subjects, sentence = Kind.CAMERA_MOVED, (names[camera],), words.moved(names[camera], px, mm)
+    kind, sentence = Kind.CAMERA_MOVED, words.moved(names[camera], px, mm)
+    subjects: tuple[str, ...] = (names[camera],)
     if tied:
         subjects = (names[camera], *tied)
         kind, sentence = Kind.CANNOT_TELL, words.either(subjects)
@@ -166,7 +167,11 @@ def _rivals(one: Change, diagnosis: Diagnosis) -> tuple[tuple[str, ...], tuple[s
     """Cameras that would explain the images almost as well, and those that do exactly so."""
     rivals, tied = [], []
     for k, h in enumerate(diagnosis.tests.hypotheses):
-        if h.cause is not Cause.POSE or h.subject == one.cause.subject or len(diagnosis.accepted) > 1:
+        if (
+            h.cause is not Cause.POSE
+            or h.subject == one.cause.subject
+            or len(diagnosis.accepted) > 1
+        ):
             continue
         short = one.statistic - float(diagnosis.outcomes.statistic[k])
         name = diagnosis.epoch.camera_names[h.subject]
@@ -218,9 +223,7 @@ def _bent(one: Change, diagnosis: Diagnosis, found: Effects) -> Finding:
     )
 
 
-def _targets(
-    carrier: int, group: list[Change], diagnosis: Diagnosis, found: Effects
-) -> Finding:
+def _targets(carrier: int, group: list[Change], diagnosis: Diagnosis, found: Effects) -> Finding:
     epoch = diagnosis.epoch
     worst = max(group, key=lambda one: one.statistic)
     mm = max(_displacement_mm(one) for one in group)

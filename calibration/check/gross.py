@@ -173,7 +173,9 @@ def _matched(
     away = np.linalg.norm(seen[strange][:, None] - nominal[strange][None], axis=2)
     rows, places = linear_sum_assignment(away)
     near = away[rows, places] < NEAR_SHARE * spacing[strange[places]]
-    goes = {int(strange[r]): int(strange[p]) for r, p, n in zip(rows, places, near, strict=True) if n}
+    goes = {
+        int(strange[r]): int(strange[p]) for r, p, n in zip(rows, places, near, strict=True) if n
+    }
     goes = {a: b for a, b in goes.items() if a != b}
     # A chain that does not close is a target that moved, not one that was taken for another.
     while set(goes) != set(goes.values()):

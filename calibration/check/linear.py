@@ -182,8 +182,7 @@ class Linear:
         return self._cut(np.asarray(self.normal - self._effect @ self.solve(self._effect.T)))
 
     def _cut(self, spread: Floats) -> Floats:
-        """Without what is left of directions that are free already: rounding, to be tested by
-        no one."""
+        """Without the rounding that is left of directions that are free already."""
         kept = np.diag(spread) > GONE * np.diag(self.normal)
         return np.asarray(spread * kept[:, None] * kept)
 

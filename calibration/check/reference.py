@@ -17,8 +17,11 @@ RANK = 1e-13
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """``interior`` (n, 9), ``centre`` (n, 3), ``rotation`` (n, 3, 3), ``target`` (m, 3) of the
-    used targets; ``root`` (15 n + 3 m, r) with ``root root^T`` their covariance."""
+    """Values and uncertainty of a calibration.
+
+    ``interior`` (n, 9), ``centre`` (n, 3), ``rotation`` (n, 3, 3), ``target`` (m, 3) of the
+    used targets; ``root`` (15 n + 3 m, r) with ``root root^T`` their covariance.
+    """
 
     interior: Floats
     centre: Floats

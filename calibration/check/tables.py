@@ -9,6 +9,7 @@ from scipy.stats import chi2, ncx2
 
 from calibration.adjustment.camera import INTERIOR, PER_CAMERA
 from calibration.adjustment.reliability import DELTA0
+from calibration.adjustment.residualgrid import residual_grid
 from calibration.adjustment.result import Calibration
 from calibration.check.consensus import Consensus
 from calibration.check.diagnosis import Diagnosis
@@ -64,8 +65,9 @@ def camera_checks(
 def _camera(
     diagnosis: Diagnosis, found: Effects, noise: Noise, k: int, hidden_limit_mm: float
 ) -> CameraCheck:
-    epoch, first = diagnosis.epoch, diagnosis.first
-    own = epoch.camera == k if len(first.v) == len(epoch.camera) else np.zeros(0, bool)
+    first = diagnosis.first
+    epoch = first.linear.epoch
+    own = epoch.camera == k
     residual = first.v * epoch.sigma_px
     mine = residual[own]
     pose, lens = _test(diagnosis, Cause.POSE, k), _test(diagnosis, Cause.LENS, k)
@@ -82,8 +84,7 @@ def _camera(
     elif sees.hidden_mm > hidden_limit_mm:
         verdict = Kind.CANNOT_TELL
         reason = f"movements that shift points by {sees.hidden_mm:.2g} mm could hide"
-    none = np.full((1, 2), np.nan)
-    mine = mine if len(mine) else none
+    mine = mine if len(mine) else np.full((1, 2), np.nan)
     return CameraCheck(
         epoch.camera_names[k],
         int(own.sum()),
@@ -98,6 +99,7 @@ def _camera(
         sees,
         verdict,
         reason,
+        residual_grid(epoch.pixel[own], residual[own], epoch.image_size_px[k]),
     )
 
 
@@ -156,7 +158,11 @@ def _carrier(
         f.kind
         for f in alarms
         if name in f.subjects
-        or any(epoch.target_carrier[epoch.target_names.index(s)] == k for s in f.subjects if s in epoch.target_names)
+        or any(
+            epoch.target_carrier[epoch.target_names.index(s)] == k
+            for s in f.subjects
+            if s in epoch.target_names
+        )
     ]
     kinds = (Kind.PRINT_SCALE, Kind.CARRIER_BENT, Kind.TARGET_MOVED, Kind.IDS_SWAPPED)
     return CarrierCheck(
@@ -222,7 +228,9 @@ def length_checks(
         variance = np.einsum("pi,pij,pj->p", unit, both, unit).sum() / seen.sum() ** 2
         total = variance + d.sigma_mm**2 + (scale_sigma * d.length_mm) ** 2
         error = float(length[seen].mean() - d.length_mm)
-        out.append(LengthCheck(d.first, d.second, d.length_mm, 1e3 * error, 1e3 * float(np.sqrt(total))))
+        out.append(
+            LengthCheck(d.first, d.second, d.length_mm, 1e3 * error, 1e3 * float(np.sqrt(total)))
+        )
     return tuple(out)
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 
+from calibration.adjustment.residualgrid import GridCell
+
 
 class Kind(StrEnum):
     """Kinds of findings."""
@@ -68,9 +70,9 @@ class Finding:
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """The smallest movement of one camera that its test could have seen (Baarda, delta0 = 4.13:
-    false alarms 0.1 %, power 80 %), each direction for itself.
+    """The smallest movement of one camera that its test could have seen.
 
+    Each direction for itself, after Baarda: delta0 = 4.13, false alarms 0.1 %, power 80 %.
     ``turn_urad`` about the camera's x, y and viewing axis; ``shift_um`` along them. ``hidden_mm``
     and ``hidden_px``: the largest effect at the subject of any movement below that bound.
     """
@@ -88,7 +90,7 @@ class CameraCheck:
     ``pose_statistic`` (6 dof) and ``lens_statistic`` (f, cx, cy: 3 dof) before anything was found
     and accounted for, with ``*_limit`` from where they alarm. ``effect_px``, ``effect_mm`` of the
     movement that the pose test estimates. ``verdict``: fine, camera-moved, lens-changed or
-    cannot-tell, and ``reason`` for the last.
+    cannot-tell, and ``reason`` for the last. ``grid``: residuals over the image.
     """
 
     name: str
@@ -107,7 +109,8 @@ class CameraCheck:
     effect_mm: float
     sensitivity: Sensitivity | None
     verdict: Kind
-    reason: str = ""
+    reason: str
+    grid: tuple[GridCell, ...]
 
 
 @dataclass(frozen=True)
@@ -115,8 +118,8 @@ class CarrierCheck:
     """One carrier: its shape test, its size against the reference, its worst target.
 
     ``shift_mm``: how far a standing one stands from where it stood before the same cameras, which
-    is harmless; NaN for carriers that are moved about. ``scale_ppm`` and ``scale_sigma_ppm``: how much larger it is than in the reference.
-    ``worst_target`` has the largest of the per-target tests (3 dof).
+    is harmless; NaN for carriers that are moved about. ``scale_ppm``
+    and ``scale_sigma_ppm``: how much larger it is than in the reference. ``worst_target`` has the largest of the per-target tests (3 dof).
     """
 
     name: str

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from calibration.adjustment.finite import finite_rows
 from calibration.adjustment.start.resection import Placed, placed_candidates
 from calibration.adjustment.start.views import View
 from geometry.arrays import Floats, Ints
@@ -43,7 +44,7 @@ def sighted(
     out = []
     for view in views:
         points = points_mm[target[view.rows]]
-        known = np.isfinite(points).all(axis=1)
+        known = finite_rows(points)
         if known.sum() < LEAST_POINTS:
             continue
         image = normalised[view.rows][known]
@@ -85,7 +86,9 @@ def _tree(root: int, links: dict[tuple[int, int], tuple[Placed, float]]) -> dict
     """Camera by camera over the link that fits best (Prim)."""
     poses = {root: Placed(np.eye(3), np.zeros(3))}
     while True:
-        open_links = [(cost, a, b) for (a, b), (_, cost) in links.items() if a in poses and b not in poses]
+        open_links = [
+            (cost, a, b) for (a, b), (_, cost) in links.items() if a in poses and b not in poses
+        ]
         if not open_links:
             return poses
         _, a, b = min(open_links)
@@ -122,8 +125,12 @@ def _disagreement(
     """Median over shared places of the misfit of one camera's answers in the other, pixels."""
     back, costs = inverse(pose), []
     for place in shared:
-        there = min(second[place].misfit(compose(pose, a), focal_px[1]) for a in first[place].candidates)
-        here = min(first[place].misfit(compose(back, b), focal_px[0]) for b in second[place].candidates)
+        there = min(
+            second[place].misfit(compose(pose, a), focal_px[1]) for a in first[place].candidates
+        )
+        here = min(
+            first[place].misfit(compose(back, b), focal_px[0]) for b in second[place].candidates
+        )
         costs.append(min(there, here))
     # Of an even number the upper median: with two places both must agree.
     return float(np.sort(costs)[len(costs) // 2])

@@ -8,6 +8,7 @@ import numpy as np
 
 from calibration.adjustment.build import Start, build, camera_poses
 from calibration.adjustment.camera import CalibratedCamera, Interior
+from calibration.adjustment.finite import finite_rows
 from calibration.adjustment.model import project
 from calibration.adjustment.options import CalibrationOptions
 from calibration.adjustment.start.chain import Sighted, chain, sighted
@@ -167,7 +168,7 @@ def _placed_middles(placing: Placing, scenery: _Scenery) -> list[tuple[Placed, F
     carrier_of = scenery.observations.targets.carrier_of
     for k, placed in enumerate(placing.placed):
         own = placing.target_mm[carrier_of == scenery.placements.carrier[k]]
-        own = own[np.isfinite(own).all(axis=1)]
+        own = own[finite_rows(own)]
         if placed is not None and len(own):
             out.append((placed, own.mean(axis=0)))
     return out

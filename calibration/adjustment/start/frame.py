@@ -11,7 +11,9 @@ from geometry.arrays import Floats
 from geometry.frames import Pose
 
 
-def moved(poses: dict[int, Placed], scale: float, rotation: Floats, shift: Floats) -> dict[int, Placed]:
+def moved(
+    poses: dict[int, Placed], scale: float, rotation: Floats, shift: Floats
+) -> dict[int, Placed]:
     """World-to-camera poses after the world became ``scale rotation x + shift``."""
     return {
         k: Placed(p.rotation @ rotation.T, scale * p.shift_mm - p.rotation @ rotation.T @ shift)
@@ -41,7 +43,8 @@ def to_start(
     reach = float(np.linalg.norm(theirs - theirs.mean(axis=0), axis=1).max()) + 1.0
     # Axes count as points a rig's width away: two centres alone would leave a turn open.
     a = [scale * ours] + [
-        scale * ours + reach * np.stack([poses[k].rotation[axis] for k in order]) for axis in range(3)
+        scale * ours + reach * np.stack([poses[k].rotation[axis] for k in order])
+        for axis in range(3)
     ]
     b = [theirs] + [
         theirs + reach * np.stack([start[k].pose.rotation_rig_to_camera[axis] for k in order])

@@ -6,6 +6,7 @@ import numpy as np
 from scipy.linalg import rq
 
 from calibration.adjustment.camera import Interior
+from calibration.adjustment.finite import finite_rows
 from calibration.adjustment.start.resection import interior_from_planes
 from calibration.adjustment.start.views import View, is_planar
 from calibration.observations import Observations
@@ -36,7 +37,7 @@ def _interior(
     planes, bodies = [], []
     for view in views:
         points = points_mm[observations.target[view.rows]]
-        known = np.isfinite(points).all(axis=1)
+        known = finite_rows(points)
         seen = points[known], observations.pixel[view.rows][known]
         if known.sum() >= LEAST_FOR_PLANE and is_planar(seen[0]):
             planes.append(seen)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from calibration.adjustment.finite import finite_rows
 from calibration.adjustment.rotations import similarity
 from calibration.adjustment.start.chain import Sighted, compose, inverse
 from calibration.adjustment.start.rays import nearest_points
@@ -70,8 +71,8 @@ def place_carriers(
     for carrier in np.unique(placements.carrier):
         own = carrier_of == carrier
         places = np.flatnonzero(placements.carrier == carrier)
-        if not np.isfinite(target[own]).all(axis=1).any():
-            best = int(max(places, key=lambda p: np.isfinite(world[p][own]).all(axis=1).sum()))
+        if not finite_rows(target[own]).any():
+            best = int(max(places, key=lambda p: finite_rows(world[p][own]).sum()))
             placed[best], held[best] = Placed(np.eye(3), np.zeros(3)), True
             target[own] = world[best][own]
         _fit_missing(placed, places, world, target, own)
@@ -112,7 +113,7 @@ def _cost(
 
 def _points_by_place(rays: RowRays, places: int, targets: int) -> Floats:
     """Targets in the world at each place, (places, targets, 3), NaN where rays do not meet."""
-    used = np.isfinite(rays.origin).all(axis=1)
+    used = finite_rows(rays.origin)
     group = rays.place[used] * targets + rays.target[used]
     points = nearest_points(rays.origin[used], rays.way[used], group, places * targets)
     return points.reshape(places, targets, 3)
@@ -123,7 +124,7 @@ def _fit_missing(
 ) -> None:
     """Places that no resection gave: a fit of the intersected targets, as for a bar of two."""
     for place in places:
-        both = own & np.isfinite(target).all(axis=1) & np.isfinite(world[place]).all(axis=1)
+        both = own & finite_rows(target) & finite_rows(world[place])
         if placed[place] is None and both.sum() >= 2:
             _, rotation, shift = similarity(target[both], world[place][both])
             placed[place] = Placed(rotation, shift)
@@ -133,7 +134,7 @@ def _fill_unknown(
     placed: list[Placed | None], places: Ints, world: Floats, target: Floats, own: Bools
 ) -> None:
     """Targets without coordinates: their mean over all places, in the carrier's frame."""
-    missing = np.flatnonzero(own & ~np.isfinite(target).all(axis=1))
+    missing = np.flatnonzero(own & ~finite_rows(target))
     if len(missing) == 0:
         return
     seen = []

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from calibration.adjustment.finite import finite_rows
 from calibration.adjustment.start.chain import compose
 from calibration.adjustment.start.rays import nearest_points
 from calibration.adjustment.start.resection import Placed, placed_candidates, relative_pose
@@ -54,9 +55,9 @@ def relative_chain(scene: Scene) -> dict[int, Placed]:
     poses = _seed(table, scene)
     while poses and len(poses) < len(table):
         points = scene.points(poses)
-        known = np.isfinite(points).all(axis=1)
+        known = finite_rows(points)
         open_cameras = [c for c in range(len(table)) if c not in poses]
-        seen = {c: known & np.isfinite(table[c]).all(axis=1) for c in open_cameras}
+        seen = {c: known & finite_rows(table[c]) for c in open_cameras}
         camera = max(open_cameras, key=lambda c: int(seen[c].sum()))
         pose = _resect(points[seen[camera]], table[camera][seen[camera]])
         if pose is None:
@@ -71,7 +72,9 @@ def _resect(points: Floats, normalised: Floats) -> Placed | None:
     found = placed_candidates(points, normalised)
     if not found:
         return None
-    return min(found, key=lambda p: float(np.nan_to_num(p.image(points) - normalised, nan=9.0).std()))
+    return min(
+        found, key=lambda p: float(np.nan_to_num(p.image(points) - normalised, nan=9.0).std())
+    )
 
 
 def _seed(table: Floats, scene: Scene) -> dict[int, Placed]:
@@ -88,7 +91,7 @@ def _seed(table: Floats, scene: Scene) -> dict[int, Placed]:
         poses = {a: Placed(np.eye(3), np.zeros(3))}
         poses[b] = compose(found[0], poses[a])
         points = scene.points(poses)[common][found[1]]
-        depth = np.median(points[np.isfinite(points).all(axis=1), 2])
+        depth = np.median(points[finite_rows(points), 2])
         # The base is 1 long: its share of the depth is the angle at which the rays meet.
         worth = float(found[1].sum() * min(1.0, 1.0 / max(depth, 1e-9)))
         if worth > best[0]:

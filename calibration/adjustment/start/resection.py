@@ -10,7 +10,7 @@ import numpy as np
 from calibration.adjustment.camera import Interior
 from calibration.adjustment.rotations import rotation_of
 from calibration.adjustment.start.views import is_planar
-from geometry.arrays import Floats
+from geometry.arrays import Bools, Floats
 from geometry.camera import NO_DISTORTION
 
 MAX_VIEWS = 15
@@ -99,7 +99,7 @@ def _in_plane(points: Floats) -> Floats:
     return np.asarray(flat)
 
 
-def relative_pose(first: Floats, second: Floats, tolerance: float) -> tuple[Placed, Floats] | None:
+def relative_pose(first: Floats, second: Floats, tolerance: float) -> tuple[Placed, Bools] | None:
     """The second camera's frame from the first's, with a base of length 1, and the inliers (n,).
 
     ``first``, ``second`` (n, 2) are normalised coordinates of the same points, ``tolerance`` in
@@ -118,4 +118,5 @@ def relative_pose(first: Floats, second: Floats, tolerance: float) -> tuple[Plac
         return None  # too few points, or degenerate ones
     if count < 6:
         return None
-    return Placed(np.asarray(rotation), np.asarray(shift).reshape(3)), np.ravel(mask) > 0
+    pose = Placed(np.asarray(rotation), np.asarray(shift).reshape(3))
+    return pose, np.asarray(np.ravel(mask) > 0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from calibration.adjustment.finite import finite_rows
 from calibration.observations import Observations, TargetSet
 from geometry.arrays import Floats, Ints
 
@@ -32,7 +33,7 @@ def _nominal_pairs(targets: TargetSet) -> list[tuple[int, int, float]]:
     """Neighbours along each carrier with known coordinates, and their distances."""
     pairs, first = [], 0
     for carrier in targets.carriers:
-        known = np.isfinite(carrier.sigma_mm).all(axis=1) & np.isfinite(carrier.nominal_mm).all(axis=1)
+        known = finite_rows(carrier.sigma_mm) & np.isfinite(carrier.nominal_mm).all(axis=1)
         own = np.flatnonzero(known)
         # Half the list apart: far enough for a good ratio, and no more pairs than targets.
         for a, b in zip(own, np.roll(own, len(own) // 2), strict=True):
