@@ -15,7 +15,7 @@ from scipy.stats import chi2
 
 from calibration.adjustment.state import State
 from calibration.check.epoch import Epoch
-from calibration.check.fit import Fit, fit, refit
+from calibration.check.fit import Fit, again, fit, refit
 from calibration.check.hypotheses import ALPHA, Cause, Hypothesis, hypotheses, log_tail
 from calibration.check.linear import Columns, Linear
 from calibration.check.scores import Outcomes, ScoreTests, estimate
@@ -98,7 +98,8 @@ def diagnose(
             near = _size_px(epoch, last, chosen) < LARGE_PX
             last = refit(epoch, last, _together([chosen], last), near)
         else:
-            last = refit(epoch, first, _together(better, first), near=True)
+            same = len(first.v) == len(epoch.pixel)
+            last = refit(epoch, first, _together(better, first), near=same)
         accepted = better
         current = ScoreTests(tests.hypotheses, last.linear.spread)
         present = current.run(last.score)
@@ -152,7 +153,7 @@ def _cleaned(epoch: Epoch, first: Fit) -> tuple[Epoch, Fit, int]:
             break
         lost += int(bad.sum())
         epoch = epoch.with_rows(~bad)
-        first = fit(epoch, first.state)
+        first = again(epoch, first)
     return epoch, first, lost
 
 

@@ -68,6 +68,13 @@ def refit(epoch: Epoch, last: Fit, more: Floats, near: bool) -> Fit:
     return _settled(epoch, last.state, unknowns, model)
 
 
+def again(epoch: Epoch, last: Fit) -> Fit:
+    """The fit with the same freedom to other rows of the same epoch."""
+    model = Linear(epoch, last.state, last.linear.freed)
+    # The state has moved with the unknowns: starting them at zero would forgive what they cost.
+    return _settled(epoch, last.state, last.unknowns, model)
+
+
 def _settled(epoch: Epoch, state: State, unknowns: Floats, model: Linear) -> Fit:
     """New models about new states until the state stays near its model."""
     done = _with_model(epoch, state, unknowns, model)

@@ -48,32 +48,35 @@ def put_right(epoch: Epoch) -> Righted:
 
     Raises :class:`InputError` when the targets are not in the reference's unit.
     """
-    assigned = _assignment(epoch)
+    start = consensus(epoch)
+    assigned = _assignment(epoch, start)
     cameras = _cycles(assigned)
     if cameras:
         epoch = _reassigned(epoch, assigned)
-    scales = _scales(epoch, consensus(epoch))
+        start = consensus(epoch)
+    scales = _scales(epoch, start)
     for carrier, scale in scales:
         epoch = _resized(epoch, carrier, scale)
-    ids = _swapped_ids(epoch, consensus(epoch))
+    start = consensus(epoch) if scales else start
+    ids = _swapped_ids(epoch, start)
     if ids:
         epoch = _relabelled(epoch, ids)
-    start = consensus(epoch)
+        start = consensus(epoch)
     off = by_camera(epoch, misfit_px(epoch, start.state)) > BAD_PX
     suspects = tuple(int(k) for k in np.flatnonzero(off)) if 2 * off.sum() < len(off) else ()
     return Righted(epoch, start, suspects, cameras, ids, scales)
 
 
-def _assignment(epoch: Epoch) -> Ints:
+def _assignment(epoch: Epoch, start: Consensus) -> Ints:
     """Which reference camera took each camera's images: swaps that make far better sense."""
     assigned = np.arange(len(epoch.camera_names))
-    cost, bad = _judged(epoch, assigned)
+    cost, bad = _judged(epoch, start)
     while bad.sum() >= 2:
         best = None
         for a, b in itertools.combinations(np.flatnonzero(bad), 2):
             tried = assigned.copy()
             tried[[a, b]] = tried[[b, a]]
-            other, other_bad = _judged(epoch, tried)
+            other, other_bad = _judged(epoch, consensus(epoch, tried))
             if best is None or other < best[0]:
                 best = other, other_bad, tried
         if best is None or best[0] > GAIN * cost:
@@ -82,8 +85,8 @@ def _assignment(epoch: Epoch) -> Ints:
     return assigned
 
 
-def _judged(epoch: Epoch, assigned: Ints) -> tuple[float, Bools]:
-    found = consensus(epoch, assigned)
+def _judged(epoch: Epoch, found: Consensus) -> tuple[float, Bools]:
+    """How badly the cameras fit in all, and which do not fit."""
     off = by_camera(epoch, misfit_px(epoch, found.state))
     bad = off > BAD_PX
     # Swapped cameras spoil each other and may spoil the others: with few cameras try all.

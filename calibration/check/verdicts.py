@@ -119,7 +119,8 @@ class CarrierCheck:
 
     ``shift_mm``: how far a standing one stands from where it stood before the same cameras, which
     is harmless; NaN for carriers that are moved about. ``scale_ppm``
-    and ``scale_sigma_ppm``: how much larger it is than in the reference. ``worst_target`` has the largest of the per-target tests (3 dof).
+    and ``scale_sigma_ppm``: how much larger it is than in the reference. ``worst_target`` has the
+    largest of the per-target tests (3 dof).
     """
 
     name: str
