@@ -1,6 +1,6 @@
 """From observations to calibrated cameras: one bundle adjustment with its full covariance."""
 
-from calibration.adjustment.calibrate import calibrate
+from calibration.adjustment.bundle import calibrate
 from calibration.adjustment.camera import CalibratedCamera, Interior
 from calibration.adjustment.options import CalibrationOptions, InteriorModel, ReferencePoses
 from calibration.adjustment.result import Calibration, CalibrationQuality

@@ -100,7 +100,7 @@ class Covariance:
     def of_functions(self, by_cameras: Floats, by_targets: Floats) -> Floats:
         """Of functions with partials (q, 15 n) by cameras and (q, m, 3) by targets, (q, q)."""
         size = PER_CAMERA * self.camera_count
-        rows = by_targets.reshape(len(by_targets), -1) @ self.target_rows()
+        rows = by_targets.reshape(len(by_targets), 3 * self.target_count) @ self.target_rows()
         rows[:, :size] += by_cameras
         own = np.einsum("qma,mab,smb->qs", by_targets, self.own_blocks(), by_targets)
         return np.asarray(rows @ self.core @ rows.T + own)

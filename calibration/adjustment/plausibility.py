@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from calibration.adjustment.build import camera_poses
+from calibration.adjustment.build import Start, camera_poses
 from calibration.adjustment.covariance import Covariance
 from calibration.adjustment.datum import reach_mm
-from calibration.adjustment.finite import finite_rows
 from calibration.adjustment.levenberg import Solution
 from calibration.adjustment.network import Network
 from calibration.adjustment.options import CalibrationOptions
@@ -34,7 +33,6 @@ def must_be_plausible(
 ) -> None:
     """Raises a one-line :class:`InputError` when the result cannot be what was meant."""
     _fits(observations, network, solution)
-    _lengths(observations, network, solution)
     _sizes(network, solution, options, observations)
     _determined(observations, network, solution, covariance)
 
@@ -63,20 +61,20 @@ def _unit(ratio: float) -> str:
     return ""
 
 
-def _lengths(observations: Observations, network: Network, solution: Solution) -> None:
-    lengths = network.lengths
+def lengths_must_agree(observations: Observations, start: Start) -> None:
+    """Raises :class:`InputError` when a measured distance is far from what the start has there.
+
+    Asked before the adjustment: that would bend everything until a wrong distance fits.
+    """
+    lengths, target = start.network.lengths, start.state.target
     ids = observations.targets.ids
-    nominal = finite_rows(network.priors.target_sigma)
-    for k, length in enumerate(lengths.length_mm):
-        a, b = int(lengths.first[k]), int(lengths.second[k])
-        target = network.priors.target
-        between = target if nominal[a] and nominal[b] else solution.state.target
-        found = float(np.linalg.norm(between[b] - between[a]))
-        if abs(found - length) > LENGTH_SHARE * min(found, length):
+    for a, b, length in zip(lengths.first, lengths.second, lengths.length_mm, strict=True):
+        found = float(np.linalg.norm(target[b] - target[a]))
+        if abs(found - length) > LENGTH_SHARE * min(found, float(length)):
             raise InputError(
                 "calibration-units",
-                f"the distance {ids[a]}-{ids[b]} is given as {length:g} mm but comes out as "
-                f"{found:.4g} mm{_unit(found / length)}",
+                f"the distance {ids[int(a)]}-{ids[int(b)]} is given as {length:g} mm but comes out "
+                f"as {found:.4g} mm{_unit(found / float(length))}",
                 "give all coordinates and distances in millimetres",
             )
 

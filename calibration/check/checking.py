@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,7 +23,14 @@ from calibration.check.tables import (
     noise_of,
     power95_factor,
 )
-from calibration.check.verdicts import CameraCheck, CheckResult, Finding, Kind, Light
+from calibration.check.verdicts import (
+    STOPPING,
+    CameraCheck,
+    CheckResult,
+    Finding,
+    Kind,
+    Light,
+)
 from calibration.observations import Observations
 from geometry.errors import CancelledError, InputError
 from solver.progress import CancelToken, NeverCancelled, Progress, ProgressCallback, ignore_progress
@@ -36,14 +43,22 @@ SHIFT_NOTE_MM = 0.05
 
 @dataclass(frozen=True)
 class CheckOptions:
-    """``hidden_limit_mm``: a camera of which larger effects could hide is not called fine."""
+    """What matters at the subject.
+
+    ``hidden_limit_mm``: a camera of which larger effects could hide is not called fine.
+    ``tolerance_mm``: smaller effects are told, but do not turn the light red. A face needs 0.05 mm
+    at most; 0.02 mm is comfortable.
+    """
 
     hidden_limit_mm: float = 0.1
+    tolerance_mm: float = 0.02
 
     def __post_init__(self) -> None:
-        if not self.hidden_limit_mm > 0.0:
+        if not (self.hidden_limit_mm > 0.0 and self.tolerance_mm >= 0.0):
             raise InputError(
-                "check-limit", "hidden_limit_mm is not positive", "give a length in millimetres"
+                "check-limit",
+                "hidden_limit_mm must be positive and tolerance_mm not negative",
+                "give lengths in millimetres",
             )
 
 
@@ -89,7 +104,7 @@ def judge(
     """All tables and findings of a finished diagnosis."""
     found = effects(diagnosis.epoch, diagnosis.first.state)
     noise = noise_of(diagnosis)
-    alarms = findings(righted, diagnosis, found)
+    alarms = [_weighed(f, options) for f in findings(righted, diagnosis, found)]
     cameras = camera_checks(diagnosis, found, noise, options.hidden_limit_mm)
     told = verdicts(alarms, cameras, noise, diagnosis)
     scale, scale_sigma = _scale(diagnosis)
@@ -113,6 +128,14 @@ def judge(
         diagnosis.outliers,
         _notes(epoch, diagnosis, reference),
     )
+
+
+def _weighed(finding: Finding, options: CheckOptions) -> Finding:
+    """The finding, marked as tolerable when its effect at the subject is."""
+    if finding.kind not in STOPPING or not finding.effect_mm < options.tolerance_mm:
+        return finding
+    more = f" That is less than the {words.length(options.tolerance_mm)} that matter."
+    return replace(finding, tolerable=True, sentence=finding.sentence + more)
 
 
 def _sigmas(diagnosis: Diagnosis) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
@@ -147,7 +170,7 @@ def verdicts(
     freedom = 2 * len(diagnosis.last.v)
     ratio = float(np.sqrt(diagnosis.last.chi2 / max(freedom, 1)))
     if ratio > UNEXPLAINED:
-        told.insert(0, Finding(Kind.CANNOT_TELL, names, words.unexplained(ratio), value=ratio))
+        told.insert(0, Finding(Kind.UNEXPLAINED, names, words.unexplained(ratio), value=ratio))
     else:
         for k in np.flatnonzero(noise.raised()):
             factor = float(noise.factor[k])

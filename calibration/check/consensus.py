@@ -11,12 +11,14 @@ from calibration.adjustment.finite import finite_rows
 from calibration.adjustment.model import project
 from calibration.adjustment.rotations import similarity
 from calibration.adjustment.start.rays import nearest_points
+from calibration.adjustment.start.resection import placed_candidates
 from calibration.adjustment.state import State
 from calibration.check.epoch import Epoch
 from calibration.check.linear import sight_of
 from geometry.arrays import Floats, Ints
 
 ROUNDS = 6
+LEAST_FOR_RESECTION = 4
 FLOOR_PX = 0.5
 """Rays nearer than this are not told apart in quality."""
 
@@ -51,7 +53,10 @@ def consensus(epoch: Epoch, assigned: Ints | None = None) -> Consensus:
         # Weights that fall with the distance make it the least sum of distances, not of squares.
         weights = 1.0 / np.maximum(np.nan_to_num(off, nan=1e6), FLOOR_PX)
     found = points.reshape(places, targets, 3)
-    placed = [_placed(epoch, found, k) for k in range(places)]
+    placed = [
+        _placed(epoch, found, k) or _resected(epoch, used, k) or (np.nan, np.eye(3), np.zeros(3))
+        for k in range(places)
+    ]
     position = np.stack([p[2] for p in placed])[epoch.view_place]
     attitude = np.stack([p[1] for p in placed])[epoch.view_place]
     state = reference.state(position, attitude)
@@ -88,13 +93,36 @@ def _miss_px(arms: Floats, ways: Floats, focal_px: Floats) -> Floats:
     return np.where(along > 0.0, aside / np.where(along > 0.0, along, 1.0) * focal_px, 1e6)
 
 
-def _placed(epoch: Epoch, found: Floats, place: int) -> tuple[float, Floats, Floats]:
+_Placed = tuple[float, Floats, Floats]
+
+
+def _resected(epoch: Epoch, used: Ints, place: int) -> _Placed | None:
+    """Attitude and position of a carrier that one camera alone saw, by resection."""
+    rows = np.flatnonzero(epoch.place == place)
+    camera = int(np.bincount(used[rows]).argmax())
+    own = rows[used[rows] == camera]
+    reference = epoch.reference
+    points = reference.target[epoch.target[own]]
+    if len(own) < LEAST_FOR_RESECTION:
+        return None
+    image = Interior.of(reference.interior[camera]).normalised(epoch.pixel[own])
+    found = placed_candidates(points, image)
+    if not found:
+        return None
+    best = min(
+        found, key=lambda p: float(np.nan_to_num(np.abs(p.image(points) - image), nan=9).sum())
+    )
+    turn = reference.rotation[camera].T
+    return np.nan, turn @ best.rotation, turn @ best.shift_mm + reference.centre[camera]
+
+
+def _placed(epoch: Epoch, found: Floats, place: int) -> _Placed | None:
     """Scale, attitude and position of one carrier, least moved by targets that do not fit."""
     own = epoch.target_carrier == epoch.place_carrier[place]
     own &= finite_rows(found[place])
     source, target = epoch.reference.target[own], found[place][own]
     if len(source) < 2:
-        return np.nan, np.eye(3), target.mean(axis=0) if len(target) else np.zeros(3)
+        return None
     weights = np.ones(len(source))
     for _ in range(ROUNDS):
         scale, rotation, shift = similarity(source, target, scaled=True, weights=weights)

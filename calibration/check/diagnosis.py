@@ -44,7 +44,7 @@ class Prepared:
     def of(cls, epoch: Epoch, state: State) -> Prepared:
         """For an epoch about a state near its fit."""
         linear = Linear(epoch, state)
-        return cls(linear, ScoreTests(hypotheses(epoch), linear.spread))
+        return cls(linear, ScoreTests(hypotheses(epoch), linear))
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,14 +80,14 @@ def diagnose(
     if prepared is not None and first.linear is prepared.linear:
         tests = prepared.tests
     else:
-        tests = ScoreTests(hypotheses(epoch), first.linear.spread)
+        tests = ScoreTests(hypotheses(epoch), first.linear)
     outcomes = tests.run(first.score)
     last, accepted, present, current = first, [], outcomes, tests
     if suspects:
         accepted = _suspected(epoch, state, tests, suspects)
         last = _full(epoch, state, accepted)
         epoch, last, lost = _cleaned(epoch, last)
-        current = ScoreTests(tests.hypotheses, last.linear.spread)
+        current = ScoreTests(tests.hypotheses, last.linear)
         present = current.run(last.score)
     while len(accepted) < MOST_CAUSES and present.margin.max(initial=-np.inf) > 0.0:
         chosen = _chosen(epoch, last, current, present)
@@ -101,7 +101,7 @@ def diagnose(
             same = len(first.v) == len(epoch.pixel)
             last = refit(epoch, first, _together(better, first), near=same)
         accepted = better
-        current = ScoreTests(tests.hypotheses, last.linear.spread)
+        current = ScoreTests(tests.hypotheses, last.linear)
         present = current.run(last.score)
     return Diagnosis(epoch, first, tests, outcomes, tuple(accepted), last, lost)
 
@@ -191,7 +191,7 @@ def _chosen(epoch: Epoch, last: Fit, tests: ScoreTests, outcomes: Outcomes) -> H
 
 def _size_px(epoch: Epoch, last: Fit, hypothesis: Hypothesis) -> float:
     """Largest shift of an image point by the most likely change."""
-    change, _ = estimate(hypothesis, last.linear.spread, last.score)
+    change, _ = estimate(hypothesis, last.linear, last.score)
     shift = last.linear.design @ (hypothesis.directions(last.linear.columns.count) @ change)
     return float(np.abs(shift.reshape(-1, 2) * epoch.sigma_px).max())
 

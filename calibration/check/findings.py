@@ -21,7 +21,8 @@ LOG10 = float(np.log(10.0))
 RIVAL = 10.0
 """Another camera whose statistic comes this near would explain the images almost as well."""
 
-TIE = 1e-4
+TIE = 0.01
+FACE_MM = 200.0
 MANY_TARGETS = 4
 SYNC = (Cause.VIEW, Cause.CAMERA_SYNC, Cause.PLACE_SYNC)
 
@@ -78,7 +79,7 @@ def findings(righted: Righted, diagnosis: Diagnosis, found: Effects) -> list[Fin
         elif cause in (Cause.BEND, Cause.SHAPE):
             out.append(_bent(one, diagnosis, found))
         elif cause in (Cause.SCALE, Cause.ALL_SCALE):
-            out.append(_scale(one, diagnosis, righted))
+            out.append(_scale(one, diagnosis, righted, found))
         else:
             sync.append(one)
     for carrier, group in by_carrier.items():
@@ -109,7 +110,7 @@ def scale_estimate(diagnosis: Diagnosis, cause: Cause, subject: int) -> tuple[fl
     first = diagnosis.first
     for h in diagnosis.tests.hypotheses:
         if h.cause is cause and h.subject == subject:
-            change, covariance = estimate(h, first.linear.spread, first.score)
+            change, covariance = estimate(h, first.linear, first.score)
             return float(change[0]), float(np.sqrt(covariance[0, 0]))
     return float("nan"), float("nan")
 
@@ -131,11 +132,13 @@ def _printed(carrier: int, scale: float, more: float, diagnosis: Diagnosis) -> F
     )
 
 
-def _scale(one: Change, diagnosis: Diagnosis, righted: Righted) -> Finding:
+def _scale(one: Change, diagnosis: Diagnosis, righted: Righted, found: Effects) -> Finding:
     if one.cause.cause is Cause.SCALE:
         before = dict(righted.scales).get(one.cause.subject, 1.0)
         return _printed(one.cause.subject, before, float(one.change[0]), diagnosis)
     value, (_, sigma) = float(one.change[0]), scale_estimate(diagnosis, Cause.ALL_SCALE, 0)
+    # What a face's width gets wrong by it.
+    effect_mm = abs(value) * FACE_MM
     return Finding(
         Kind.SCALE_CHANGED,
         diagnosis.epoch.carrier_names,
@@ -143,6 +146,8 @@ def _scale(one: Change, diagnosis: Diagnosis, righted: Righted) -> Finding:
         one.statistic,
         one.dof,
         one.log10_p,
+        effect_mm / found.gsd_mm,
+        effect_mm,
         value=1.0 + value,
         sigma=sigma,
     )

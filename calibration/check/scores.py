@@ -13,6 +13,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from calibration.check.hypotheses import Hypothesis, log_tail
+from calibration.check.linear import GONE, Linear
 from geometry.arrays import Floats, Ints
 
 RANK = 1e-8
@@ -37,12 +38,12 @@ class Outcomes:
 class ScoreTests:
     """The tests of many hypotheses, prepared: each is a few columns applied to the score."""
 
-    def __init__(self, hypotheses: tuple[Hypothesis, ...], spread: Floats) -> None:
-        """``spread`` (base, base): the covariance of the score."""
+    def __init__(self, hypotheses: tuple[Hypothesis, ...], linear: Linear) -> None:
+        """``linear``: the model whose score is to be tested."""
         self.hypotheses = hypotheses
-        roots = [h.ways @ _reduced(h, spread) for h in hypotheses]
+        roots = [h.ways @ _reduced(h, linear) for h in hypotheses]
         self.dof: Ints = np.array([r.shape[1] for r in roots], dtype=np.int64)
-        self._root = np.zeros((len(spread), int(self.dof.sum())))
+        self._root = np.zeros((linear.columns.count, int(self.dof.sum())))
         self._first = np.concatenate([[0], np.cumsum(self.dof)]).astype(np.int64)
         for k, root in enumerate(roots):
             self._root[hypotheses[k].columns, self._first[k] : self._first[k + 1]] = root
@@ -68,20 +69,23 @@ class ScoreTests:
         return float(chi2.isf(self.hypotheses[index].alpha, max(int(self.dof[index]), 1)))
 
 
-def _reduced(hypothesis: Hypothesis, spread: Floats) -> Floats:
+def _reduced(hypothesis: Hypothesis, linear: Linear) -> Floats:
     """R (d, rank) with ``R R^T`` the pseudo-inverse of the hypothesis's covariance (d, d)."""
     places, ways = hypothesis.columns, hypothesis.ways
-    own = ways.T @ spread[np.ix_(places, places)] @ ways
-    scale = np.sqrt(np.maximum(np.diag(own), 0.0))
-    safe = np.where(scale > 0.0, scale, 1.0)
-    sizes, axes = np.linalg.eigh(own / np.outer(safe, safe))
-    # Columns that others determine have no variance left; their unit scale keeps them at zero.
+    square = np.ix_(places, places)
+    own = ways.T @ linear.spread[square] @ ways
+    full = np.einsum("cd,cd->d", ways, linear.normal[square] @ ways)
+    diagonal = np.diag(own)
+    # What others determine has but rounding left: it must not be blown up to a unit.
+    kept = diagonal > GONE * full
+    scale = np.where(kept, np.sqrt(np.where(kept, diagonal, 1.0)), np.inf)
+    sizes, axes = np.linalg.eigh(own / np.outer(scale, scale))
     good = sizes > RANK * max(float(sizes.max(initial=0.0)), RANK)
-    return np.asarray(axes[:, good] / safe[:, None] / np.sqrt(sizes[good]))
+    return np.asarray(axes[:, good] / scale[:, None] / np.sqrt(sizes[good]))
 
 
-def estimate(hypothesis: Hypothesis, spread: Floats, score: Floats) -> tuple[Floats, Floats]:
+def estimate(hypothesis: Hypothesis, linear: Linear, score: Floats) -> tuple[Floats, Floats]:
     """The most likely change (d,) along a hypothesis's directions, and its covariance (d, d)."""
-    reduced = _reduced(hypothesis, spread)
+    reduced = _reduced(hypothesis, linear)
     right = hypothesis.ways.T @ score[hypothesis.columns]
     return np.asarray(reduced @ (reduced.T @ right)), np.asarray(reduced @ reduced.T)

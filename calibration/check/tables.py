@@ -123,7 +123,7 @@ def _pose_effect(diagnosis: Diagnosis, found: Effects, camera: int) -> tuple[flo
             return found.of(camera, one.change, INTERIOR)
     for h in diagnosis.tests.hypotheses:
         if h.cause is Cause.POSE and h.subject == camera:
-            change, _ = estimate(h, diagnosis.last.linear.spread, diagnosis.last.score)
+            change, _ = estimate(h, diagnosis.last.linear, diagnosis.last.score)
             return found.of(camera, change, INTERIOR)
     return float("nan"), float("nan")
 
@@ -242,7 +242,8 @@ def _point_spread(diagnosis: Diagnosis) -> Floats:
     by_shift = linear.design.data.reshape(-1, 2, width)[:, :, PER_CAMERA + 3 : PER_CAMERA + 6]
     normal = np.zeros((places * targets, 3, 3))
     np.add.at(normal, epoch.points, np.swapaxes(by_shift, 1, 2) @ by_shift)
-    good = np.linalg.eigvalsh(normal)[:, 0] > 0.0
+    sizes = np.linalg.eigvalsh(normal)
+    good = sizes[:, 0] > 1e-12 * np.maximum(sizes[:, 2], 1e-300)
     out = np.full_like(normal, np.nan)
     out[good] = np.linalg.inv(normal[good])
     return out.reshape(places, targets, 3, 3)

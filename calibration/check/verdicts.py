@@ -22,18 +22,29 @@ class Kind(StrEnum):
     CAMERAS_SWAPPED = "cameras-swapped"
     UNSYNCHRONISED = "unsynchronised"
     NOISE_RAISED = "noise-raised"
+    UNEXPLAINED = "unexplained"
     CANNOT_TELL = "cannot-tell"
 
 
 class Light(StrEnum):
-    """The whole check in one word."""
+    """The whole check in one word: go on, look, or stop."""
 
     GREEN = "green"
     YELLOW = "yellow"
     RED = "red"
 
 
-DOUBTFUL = frozenset({Kind.CANNOT_TELL, Kind.NOISE_RAISED})
+STOPPING = frozenset(
+    {
+        Kind.CAMERA_MOVED,
+        Kind.LENS_CHANGED,
+        Kind.SCALE_CHANGED,
+        Kind.CAMERAS_SWAPPED,
+        Kind.UNSYNCHRONISED,
+        Kind.UNEXPLAINED,
+    }
+)
+"""What spoils pictures taken with the old calibration; the other kinds are about the targets."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +57,7 @@ class Finding:
     then. ``effect_px``: root mean square shift of image points; ``effect_mm``: of points at the
     subject when the old calibration goes on being used; both NaN where they mean nothing.
     ``value`` is the finding's own number (a scale, a factor of noise), ``sigma`` its sigma.
+    ``tolerable``: sure, but so small that the old calibration still serves.
     """
 
     kind: Kind
@@ -59,13 +71,14 @@ class Finding:
     value: float = float("nan")
     sigma: float = float("nan")
     candidates: tuple[str, ...] = ()
+    tolerable: bool = False
 
     @property
     def light(self) -> Light:
         """What the finding means for the whole."""
         if self.kind is Kind.FINE:
             return Light.GREEN
-        return Light.YELLOW if self.kind in DOUBTFUL else Light.RED
+        return Light.RED if self.kind in STOPPING and not self.tolerable else Light.YELLOW
 
 
 @dataclass(frozen=True)

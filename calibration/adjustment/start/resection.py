@@ -45,9 +45,14 @@ def placed_candidates(points_mm: Floats, normalised: Floats) -> list[Placed]:
     a plane and its mirror image in depth look nearly alike; other views must choose.
     """
     cv2 = _cv2()
-    centre = points_mm.mean(axis=0)
-    points = np.ascontiguousarray(points_mm - centre)
-    method = cv2.SOLVEPNP_IPPE if is_planar(points) else cv2.SOLVEPNP_SQPNP
+    centre, axes = points_mm.mean(axis=0), np.eye(3)
+    points = points_mm - centre
+    method = cv2.SOLVEPNP_SQPNP
+    if is_planar(points):
+        method = cv2.SOLVEPNP_IPPE
+        # It answers nothing when a plane is not exactly flat, as a measured plate never is.
+        points, axes = _in_plane(points)
+    points = np.ascontiguousarray(points)
     try:
         _, turns, shifts, _ = cv2.solvePnPGeneric(
             points, np.ascontiguousarray(normalised), np.eye(3), None, flags=method
@@ -56,7 +61,7 @@ def placed_candidates(points_mm: Floats, normalised: Floats) -> list[Placed]:
         return []  # OpenCV's way to say that the points are degenerate
     found = []
     for turn, shift in zip(turns, shifts, strict=True):
-        rotation = rotation_of(np.asarray(turn, np.float64).reshape(3))
+        rotation = rotation_of(np.asarray(turn, np.float64).reshape(3)) @ axes
         moved = np.asarray(shift, np.float64).reshape(3) - rotation @ centre
         if np.isfinite(rotation).all() and np.isfinite(moved).all():
             found.append(Placed(rotation, moved))
@@ -69,7 +74,7 @@ def interior_from_planes(
     """Interior from views of plates, (points (n, 3), pixels (n, 2)) each (Zhang's method)."""
     cv2 = _cv2()
     views = sorted(views, key=lambda v: -len(v[0]))[:MAX_VIEWS]
-    flat = [_in_plane(points) for points, _ in views]
+    flat = [_in_plane(points)[0] for points, _ in views]
     objects = [np.ascontiguousarray(p, np.float32) for p in flat]
     images = [np.ascontiguousarray(p, np.float32).reshape(-1, 1, 2) for _, p in views]
     flags = cv2.CALIB_FIX_K2 | cv2.CALIB_FIX_K3 | cv2.CALIB_ZERO_TANGENT_DIST
@@ -90,13 +95,14 @@ def interior_from_planes(
     return Interior(f, np.array([matrix[0, 2], matrix[1, 2]]), distortion)
 
 
-def _in_plane(points: Floats) -> Floats:
-    """Points of a plane (n, 3) in coordinates with z = 0, right-handed as before."""
+def _in_plane(points: Floats) -> tuple[Floats, Floats]:
+    """Points of a plane (n, 3) in axes (3, 3) of their own with z = 0, right-handed as before."""
     centred = points - points.mean(axis=0)
     _, _, axes = np.linalg.svd(centred, full_matrices=False)
-    flat = centred @ (axes * np.array([[1.0], [1.0], [np.linalg.det(axes)]])).T
+    axes = axes * np.array([[1.0], [1.0], [np.linalg.det(axes)]])
+    flat = centred @ axes.T
     flat[:, 2] = 0.0
-    return np.asarray(flat)
+    return flat, np.asarray(axes)
 
 
 def relative_pose(first: Floats, second: Floats, tolerance: float) -> tuple[Placed, Bools] | None:

@@ -16,7 +16,7 @@ from calibration.adjustment.inspection import inspect
 from calibration.adjustment.levenberg import LossOptions, Solution, Stop, adjust
 from calibration.adjustment.network import Network
 from calibration.adjustment.options import CalibrationOptions
-from calibration.adjustment.plausibility import must_be_plausible
+from calibration.adjustment.plausibility import lengths_must_agree, must_be_plausible
 from calibration.adjustment.quality import (
     Judged,
     camera_table,
@@ -74,6 +74,7 @@ def calibrate(
             "no target is seen by two cameras or belongs to a carrier that could be placed",
             "show the same targets to several cameras at once",
         )
+    lengths_must_agree(observations, start)
     progress(Progress("start", 0.1))
     try:
         done = _adjusted(start, options, progress, cancel)
@@ -104,7 +105,9 @@ def _adjusted(
         covariance = solution.reduction.covariance()
         found = reliability(solution, covariance, network)
         bad, change = settle(solution, network, found, options)
-        if round_ == ROUNDS or not (bad.any() or np.abs(change - 1.0).max() > SETTLED):
+        settled = not (bad.any() or np.abs(change - 1.0).max() > SETTLED)
+        # What does not converge fits nothing: its residuals say nothing of sigmas or blunders.
+        if settled or round_ == ROUNDS or solution.stop is not Stop.CONVERGED:
             break
         rejected = np.concatenate([rejected, start.rows[bad]])
         factor = factor * change
