@@ -62,7 +62,7 @@ class Columns:
 
 
 CHUNK = 8192
-GONE = 1e-9
+GONE = 1e-7
 """A column whose score keeps less than this share of its variance is determined by others."""
 
 

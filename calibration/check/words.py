@@ -33,7 +33,7 @@ def either(cameras: tuple[str, ...]) -> str:
     """One of several cameras moved, and the images cannot tell which."""
     return (
         f"One of {joined(cameras)} has moved, but the images cannot tell which; "
-        "more cameras or a standing target would."
+        "a third camera would."
     )
 
 
