@@ -79,9 +79,7 @@ class Bench:
             righted.suspects,
             None if touched else self.prepared,
         )
-        return judge(
-            self.calibration, observations, base, righted, diagnosis, CheckOptions()
-        )
+        return judge(self.calibration, observations, base, righted, diagnosis, CheckOptions())
 
 
 @dataclass(frozen=True, eq=False)
@@ -268,8 +266,11 @@ def target_moved(um: float) -> Disturb:
 
 @dataclass(frozen=True)
 class Tally:
-    """Of ``trials``: ``alarmed`` not green; ``kind`` with the right kind among the findings;
-    ``named`` with that kind about exactly the right ones; ``alone`` with nothing else found."""
+    """What became of ``trials``.
+
+    ``alarmed``: not green; ``kind``: with the right kind among the findings; ``named``: with that
+    kind about exactly the right ones; ``alone``: and with nothing else found.
+    """
 
     trials: int
     alarmed: int

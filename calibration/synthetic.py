@@ -72,7 +72,7 @@ def plate(
 
 
 def bars(
-    carrier: Carrier, points: Floats, count: int = 4, sigma_mm: float = 0.005, seed: int = 5
+    carrier: Carrier, points: Floats, count: int = 6, sigma_mm: float = 0.003, seed: int = 5
 ) -> tuple[Distance, ...]:
     """Measured distances between the farthest targets of a carrier, off by ``sigma_mm``."""
     rng = np.random.default_rng(seed)
@@ -196,7 +196,7 @@ def face_scene(
     frames: int = 12,
     seed: int = 1,
 ) -> Scene:
-    """A stand of ring targets with four scale bars, and a plate shown in ``frames`` places."""
+    """A stand of ring targets with six scale bars, and a plate shown in ``frames`` places."""
     rig = cameras or face_rig()
     still, still_points = stand(rings, seed)
     moving, moving_points = plate(seed=seed + 1)

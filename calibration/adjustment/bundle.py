@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calibration.adjustment.build import Start, some_rows, with_sigmas
-from calibration.adjustment.camera import INTERIOR_NAMES, CalibratedCamera
+from calibration.adjustment.camera import CalibratedCamera
 from calibration.adjustment.components import image_components, prior_components
 from calibration.adjustment.covariance import Covariance
 from calibration.adjustment.crossvalidation import cross_validate
 from calibration.adjustment.finite import finite_rows
 from calibration.adjustment.inspection import inspect
-from calibration.adjustment.levenberg import LossOptions, Solution, Stop, adjust
+from calibration.adjustment.levenberg import Solution, Stop, adjust
 from calibration.adjustment.network import Network
 from calibration.adjustment.options import CalibrationOptions
 from calibration.adjustment.plausibility import lengths_must_agree, must_be_plausible
@@ -28,6 +28,7 @@ from calibration.adjustment.reduction import SingularError
 from calibration.adjustment.reliability import Reliability, reliability
 from calibration.adjustment.result import Calibration, CalibrationQuality, Place, ResidualTable
 from calibration.adjustment.settling import settle
+from calibration.adjustment.stages import NEAR_DAMPING, adjust_in_stages
 from calibration.adjustment.start.finding import find_start
 from calibration.observations import Observations
 from geometry.arrays import Floats, Ints
@@ -97,10 +98,10 @@ def _adjusted(
     """Adjusted, tested, and adjusted again until sigmas and blunders are settled."""
     network, state = start.network, start.state
     factor, rejected = np.ones(network.camera_count), np.empty(0, np.int64)
-    if not options.start:
-        state = adjust(_stiff(network), state, _loose(options.loss), cancel=cancel).state
-    solution = adjust(network, state, options.loss, _later(progress), cancel)
-    iterations = solution.iterations
+    solution = adjust_in_stages(
+        network, state, options.loss, bool(options.start), _later(progress), cancel
+    )
+    iterations, near = solution.iterations, replace(options.loss, damping=NEAR_DAMPING)
     for round_ in range(ROUNDS + 1):
         covariance = solution.reduction.covariance()
         found = reliability(solution, covariance, network)
@@ -113,21 +114,9 @@ def _adjusted(
         factor = factor * change
         network = some_rows(with_sigmas(network, change), ~bad)
         start = replace(start, rows=start.rows[~bad])
-        solution = adjust(network, solution.state, options.loss, cancel=cancel)
+        solution = adjust(network, solution.state, near, cancel=cancel)
         iterations += solution.iterations
     return _Adjusted(start, network, solution, covariance, found, factor, rejected, iterations)
-
-
-def _stiff(network: Network) -> Network:
-    """With cameras that have a focal length and one distortion term: far starts need no more."""
-    sigma = network.priors.interior_sigma.copy()
-    held = [k for k, name in enumerate(INTERIOR_NAMES) if name not in ("f", "k1")]
-    sigma[:, held] = 0.0
-    return replace(network, priors=replace(network.priors, interior_sigma=sigma))
-
-
-def _loose(loss: LossOptions) -> LossOptions:
-    return replace(loss, tolerance=1.0, max_iterations=50)
 
 
 def _later(progress: ProgressCallback) -> ProgressCallback:
@@ -188,6 +177,7 @@ def _quality(
     lost = np.bincount(observations.camera[done.rejected], minlength=len(cameras))
     judged = Judged(
         cameras,
+        observations.targets.ids,
         network,
         solution,
         done.covariance,

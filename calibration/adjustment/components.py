@@ -101,4 +101,6 @@ def _lengths(solution: Solution, network: Network, covariance: Covariance) -> Co
     nothing = np.zeros((len(rows), len(covariance.cameras)))
     spread = np.diag(covariance.of_functions(nothing, rows))
     squares = (solution.residuals.length / lengths.sigma_mm) ** 2
-    return _component("distances", squares, 1.0 - spread / lengths.sigma_mm**2)
+    # What the loss holds back takes less part in the fit, and is checked by the others more.
+    redundancy = 1.0 - solution.length_weights * spread / lengths.sigma_mm**2
+    return _component("distances", squares, redundancy)

@@ -11,6 +11,7 @@ from calibration.adjustment.levenberg import LossOptions, adjust
 from calibration.adjustment.network import Network
 from calibration.adjustment.reduction import SingularError
 from calibration.adjustment.result import CrossValidation
+from calibration.adjustment.stages import NEAR_DAMPING
 from calibration.adjustment.state import State
 from geometry.arrays import Bools, Floats, Ints
 
@@ -71,7 +72,7 @@ def _alone(network: Network) -> Network:
 def _solved(network: Network, state: State, loss: LossOptions) -> tuple[Floats, Floats] | None:
     """Camera parameters (15 n,) and their covariance."""
     try:
-        solution = adjust(network, state, loss)
+        solution = adjust(network, state, replace(loss, damping=NEAR_DAMPING))
         covariance = solution.reduction.covariance().cameras
     except SingularError:
         return None

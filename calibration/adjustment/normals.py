@@ -80,15 +80,14 @@ def all_residuals(state: State, network: Network) -> Residuals:
 
 
 def prior_cost(found: Residuals, network: Network) -> float:
-    """Weighted square sum of all residuals but the pixels'."""
+    """Weighted square sum of the residuals of interiors, poses and coordinates."""
     priors = network.priors
     pairs = (
         (found.interior, priors.interior_sigma),
         (found.exterior, priors.exterior_sigma),
         (found.target, priors.target_sigma),
     )
-    total = sum(float(np.sum(r * r * _weights(s))) for r, s in pairs)
-    return total + float(np.sum((found.length / network.lengths.sigma_mm) ** 2))
+    return sum(float(np.sum(r * r * _weights(s))) for r, s in pairs)
 
 
 def _flat_index(rows: Ints, width: int, columns: Ints, height: int, stride: int) -> Ints:

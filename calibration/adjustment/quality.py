@@ -34,6 +34,7 @@ class Judged:
     """What the judgement rests on."""
 
     cameras: tuple[CalibratedCamera, ...]
+    target_ids: tuple[str, ...]
     network: Network
     solution: Solution
     covariance: Covariance
@@ -126,7 +127,7 @@ def warnings(
     if lengths.redundancy > 0.5 and lengths.factor > 3.0:
         out.append(
             f"Measured distances disagree with the images {lengths.factor:.1f} times as much as "
-            "stated: check their lengths and units."
+            f"stated, {_worst_length(judged)}: check their lengths."
         )
     for row in table:
         out += _camera_warnings(row)
@@ -137,6 +138,14 @@ def warnings(
             "open, which does little harm as long as camera and lens stay together."
         )
     return tuple(out)
+
+
+def _worst_length(judged: Judged) -> str:
+    """The measured distance that fits worst, in words."""
+    lengths, residual = judged.network.lengths, judged.solution.residuals.length
+    worst = int(np.argmax(np.abs(residual) / lengths.sigma_mm))
+    ends = [judged.target_ids[int(k[worst])] for k in (lengths.first, lengths.second)]
+    return f"most of all {ends[0]}-{ends[1]} by {residual[worst]:+.3f} mm"
 
 
 def _camera_warnings(row: CameraQuality) -> list[str]:

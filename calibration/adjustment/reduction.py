@@ -39,8 +39,9 @@ class _System:
     right: Floats
 
 
-def _length_rows(state: State, network: Network) -> tuple[Floats, Floats]:
+def _length_rows(state: State, network: Network, weights: Floats) -> tuple[Floats, Floats]:
     """Weighted partials (d, kept, 3) of the distances by the kept targets, and misfits (d,)."""
+    root = np.sqrt(weights)
     lengths = network.lengths
     between = state.target[lengths.second] - state.target[lengths.first]
     computed = np.linalg.norm(between, axis=1)
@@ -49,11 +50,11 @@ def _length_rows(state: State, network: Network) -> tuple[Floats, Floats]:
     number = np.arange(len(computed))
     rows[number, np.searchsorted(network.kept, lengths.second)] = way
     rows[number, np.searchsorted(network.kept, lengths.first)] = -way
-    rows *= network.target_free[network.kept]
-    return rows, (lengths.length_mm - computed) / lengths.sigma_mm
+    rows *= network.target_free[network.kept] * root[:, None, None]
+    return rows, root * (lengths.length_mm - computed) / lengths.sigma_mm
 
 
-def _system(normals: Normals, state: State, network: Network) -> _System:
+def _system(normals: Normals, state: State, network: Network, weights: Floats) -> _System:
     kept, taken, c = network.kept, network.eliminated, network.core_count
     if len(kept) == 0:
         return _System(
@@ -67,7 +68,7 @@ def _system(normals: Normals, state: State, network: Network) -> _System:
     for k, target in enumerate(kept):
         place = slice(c + 3 * k, c + 3 * k + 3)
         core[place, place], right[place] = normals.target[target], normals.target_right[target]
-    rows, misfit = _length_rows(state, network)
+    rows, misfit = _length_rows(state, network, weights)
     flat = rows.reshape(len(rows), -1)
     core[c:, c:] += flat.T @ flat
     right[c:] += flat.T @ misfit
@@ -79,15 +80,21 @@ def _system(normals: Normals, state: State, network: Network) -> _System:
 class Reduction:
     """The normal equations with damping, reduced to the core and factored.
 
-    ``damping`` multiplies the diagonal by ``1 + damping`` (Levenberg, Marquardt). Raises
-    :class:`SingularError` when something is not determined.
+    ``length_weights`` (d,) of the robust loss; ``damping`` multiplies the diagonal by
+    ``1 + damping`` (Levenberg, Marquardt). Raises :class:`SingularError` when something is not
+    determined.
     """
 
     def __init__(
-        self, normals: Normals, state: State, network: Network, damping: float = 0.0
+        self,
+        normals: Normals,
+        state: State,
+        network: Network,
+        length_weights: Floats,
+        damping: float = 0.0,
     ) -> None:
         self._network = network
-        system = _system(normals, state, network)
+        system = _system(normals, state, network, length_weights)
         self._right = system.core_right, system.right
         taken = system.blocks * (1.0 + damping * np.eye(3))
         try:

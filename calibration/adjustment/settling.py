@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.stats import chi2
 
@@ -32,8 +34,10 @@ def settle(
         bad = _blunders(network, found, options.rescale)
     if not options.rescale:
         return bad, np.ones(count)
-    good = np.where(bad, 0.0, solution.weights)
-    whole, *each = image_components(_weighted(solution, good), network, _kept(found, ~bad))
+    # Good points count in full even where the loss holds them back: a camera that is noisier
+    # than stated would otherwise seem half as noisy as it is.
+    good = np.where(bad, 0.0, 1.0)
+    whole, *each = image_components(replace(solution, weights=good), network, _kept(found, ~bad))
     common = whole.factor if whole.significant else 1.0
     return bad, np.array([_factor(c, common) for c in each])
 
@@ -44,19 +48,6 @@ def _factor(own: Component, common: float) -> float:
     if abs(relative**2 - 1.0) > 3.0 * scatter and max(relative, 1.0 / relative) > OWN_FACTOR:
         return own.factor
     return common
-
-
-def _weighted(solution: Solution, weights: Floats) -> Solution:
-    return Solution(
-        solution.state,
-        solution.partials,
-        solution.residuals,
-        weights,
-        solution.reduction,
-        solution.cost,
-        solution.iterations,
-        solution.stop,
-    )
 
 
 def _kept(found: Reliability, good: Bools) -> Reliability:

@@ -25,12 +25,13 @@ class Effects:
 
     ``px`` (n, 15, 15) of its image points; ``mm`` (n, 15, 15) of the points in space that are
     intersected with the old calibration although this camera has changed. ``gsd_mm``: how much
-    of the subject one pixel is, over all cameras.
+    of the subject one pixel is, over all cameras. ``rotation`` (n, 3, 3) rig to camera.
     """
 
     px: Floats
     mm: Floats
     gsd_mm: float
+    rotation: Floats
 
     def of(self, camera: int, change: Floats, first: int) -> tuple[float, float]:
         """Root mean square effect in px and mm of a change (d,) of parameters from ``first``."""
@@ -53,7 +54,7 @@ def effects(epoch: Epoch, state: State) -> Effects:
             px[k] = np.einsum("nap,naq->pq", parts.camera[own], parts.camera[own]) / own.sum()
             mm[k] = np.einsum("nap,naq->pq", moved[own], moved[own]) / own.sum()
     focal = state.interior[epoch.camera, 0]
-    return Effects(px, mm, float(np.median(parts.depth / focal)))
+    return Effects(px, mm, float(np.median(parts.depth / focal)), state.rotation)
 
 
 def _point_shifts(epoch: Epoch, by_point: Floats, by_camera: Floats) -> Floats:
@@ -82,7 +83,10 @@ def sensitivity(
     own = spread[np.ix_(place, place)]
     if not (np.diag(own) > 0.0).all():
         return None
-    single = DELTA0 / np.sqrt(np.diag(own))
+    # Shifts are unknowns along the rig's axes, but are told along the camera's.
+    turned = np.eye(6)
+    turned[:3, :3] = found.rotation[camera].T
+    single = DELTA0 / np.sqrt(np.diag(turned.T @ own @ turned))
     part = slice(INTERIOR, PER_CAMERA)
     shift, turn = single[:3] * MICROMETRE, single[3:] * URAD
     hidden_px = DELTA0 * _largest(found.px[camera, part, part], own)
