@@ -26,12 +26,18 @@ from calibration.adjustment.quality import (
 )
 from calibration.adjustment.reduction import SingularError
 from calibration.adjustment.reliability import Reliability, reliability
-from calibration.adjustment.result import Calibration, CalibrationQuality, Place, ResidualTable
-from calibration.adjustment.settling import settle
+from calibration.adjustment.result import (
+    Calibration,
+    CalibrationQuality,
+    LateView,
+    Place,
+    ResidualTable,
+)
+from calibration.adjustment.settling import late_points, settle
 from calibration.adjustment.stages import NEAR_DAMPING, adjust_in_stages
 from calibration.adjustment.start.finding import find_start
 from calibration.observations import Observations
-from geometry.arrays import Floats, Ints
+from geometry.arrays import Bools, Floats, Ints
 from geometry.errors import InputError
 from solver.progress import CancelToken, Progress, ProgressCallback, ignore_progress
 
@@ -51,6 +57,7 @@ class _Adjusted:
     reliability: Reliability
     factor: Floats
     rejected: Ints
+    late: tuple[LateView, ...]
     iterations: int
 
 
@@ -78,7 +85,7 @@ def calibrate(
     lengths_must_agree(observations, start)
     progress(Progress("start", 0.1))
     try:
-        done = _adjusted(start, options, progress, cancel)
+        done = _adjusted(observations, start, options, progress, cancel)
     except SingularError as error:
         raise InputError(
             "calibration-undetermined",
@@ -90,6 +97,7 @@ def calibrate(
 
 
 def _adjusted(
+    observations: Observations,
     start: Start,
     options: CalibrationOptions,
     progress: ProgressCallback,
@@ -101,22 +109,41 @@ def _adjusted(
     solution = adjust_in_stages(
         network, state, options.loss, bool(options.start), _later(progress), cancel
     )
+    late: list[LateView] = []
     iterations, near = solution.iterations, replace(options.loss, damping=NEAR_DAMPING)
     for round_ in range(ROUNDS + 1):
         covariance = solution.reduction.covariance()
         found = reliability(solution, covariance, network)
-        bad, change = settle(solution, network, found, options)
+        bad, change = settle(solution, network, found, options, round_ == 0)
         settled = not (bad.any() or np.abs(change - 1.0).max() > SETTLED)
-        # What does not converge fits nothing: its residuals say nothing of sigmas or blunders.
-        if settled or round_ == ROUNDS or solution.stop is not Stop.CONVERGED:
+        if settled or round_ == ROUNDS or solution.stop is Stop.STUCK:
             break
+        late += _views(observations, start, network, late_points(solution, network) & bad)
         rejected = np.concatenate([rejected, start.rows[bad]])
         factor = factor * change
         network = some_rows(with_sigmas(network, change), ~bad)
         start = replace(start, rows=start.rows[~bad])
         solution = adjust(network, solution.state, near, cancel=cancel)
         iterations += solution.iterations
-    return _Adjusted(start, network, solution, covariance, found, factor, rejected, iterations)
+    return _Adjusted(
+        start, network, solution, covariance, found, factor, rejected, tuple(late), iterations
+    )
+
+
+def _views(
+    observations: Observations, start: Start, network: Network, late: Bools
+) -> list[LateView]:
+    """Which views these points (n,) are of."""
+    sight = network.sight
+    pairs = np.unique(np.stack([sight.camera[late], sight.pose[late]], axis=1), axis=0)
+    frames = start.placements.frame
+    return [
+        LateView(
+            observations.cameras[int(c)],
+            observations.frames[int(frames[p])] if frames[p] >= 0 else "",
+        )
+        for c, p in pairs
+    ]
 
 
 def _later(progress: ProgressCallback) -> ProgressCallback:
@@ -199,6 +226,7 @@ def _quality(
         network.observation_count - network.unknown_count,
         float(np.sqrt(np.mean(pixels * pixels))),
         len(done.rejected),
+        done.late,
         len(observations.pixel) - len(done.start.rows) - len(done.rejected),
         table,
         components,
@@ -206,5 +234,5 @@ def _quality(
         correlations(judged),
         cross,
         done.start.scale,
-        warnings(judged, table, cross),
+        warnings(judged, table, cross, done.late),
     )

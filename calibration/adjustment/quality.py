@@ -18,7 +18,13 @@ from calibration.adjustment.levenberg import Solution
 from calibration.adjustment.network import Network
 from calibration.adjustment.reliability import Reliability
 from calibration.adjustment.residualgrid import residual_grid
-from calibration.adjustment.result import CameraQuality, Correlation, CrossValidation, WeakParameter
+from calibration.adjustment.result import (
+    CameraQuality,
+    Correlation,
+    CrossValidation,
+    LateView,
+    WeakParameter,
+)
 
 WEAK_PRIOR_SHARE = 0.5
 STRONG_CORRELATION = 0.98
@@ -107,7 +113,10 @@ def correlations(judged: Judged) -> tuple[Correlation, ...]:
 
 
 def warnings(
-    judged: Judged, table: tuple[CameraQuality, ...], cross: CrossValidation | None
+    judged: Judged,
+    table: tuple[CameraQuality, ...],
+    cross: CrossValidation | None,
+    late: tuple[LateView, ...],
 ) -> tuple[str, ...]:
     """One sentence for each thing a user should know, the most important first."""
     out = []
@@ -115,6 +124,12 @@ def warnings(
         out.append(
             f"Two halves of the images differ {cross.ratio:.1f} times as much as predicted: "
             "the camera model does not fit these lenses, or the targets moved."
+        )
+    if late:
+        told = ", ".join(f"{v.camera} in {v.frame}" for v in late[:3])
+        out.append(
+            f"{len(late)} views were left out because their cameras exposed at another moment than "
+            f"the others ({told}{', ...' if len(late) > 3 else ''}): check the synchronisation."
         )
     factors = {c.name: c for c in judged.components}
     nominal = factors["coordinates"]

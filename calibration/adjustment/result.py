@@ -89,12 +89,21 @@ class CrossValidation:
 
 
 @dataclass(frozen=True)
+class LateView:
+    """A camera's picture in one frame that was taken at another moment than the others'."""
+
+    camera: str
+    frame: str
+
+
+@dataclass(frozen=True)
 class CalibrationQuality:
     """How an adjustment went.
 
-    ``chi2`` over ``dof`` with the sigmas in use (after any correction); ``components`` factors of
-    stated sigmas by group. ``scale`` says where the size comes from. ``warnings``: one sentence
-    each, the most important first.
+    ``rejected`` image points failed their test, those of ``late_views`` among them; ``dropped``
+    ones could not be used from the start. ``chi2`` over ``dof`` with the sigmas in use (after any
+    correction); ``components`` factors of stated sigmas by group. ``scale`` says where the size
+    comes from. ``warnings``: one sentence each, the most important first.
     """
 
     converged: bool
@@ -104,6 +113,7 @@ class CalibrationQuality:
     dof: int
     rms_px: float
     rejected: int
+    late_views: tuple[LateView, ...]
     dropped: int
     cameras: tuple[CameraQuality, ...]
     components: tuple[Component, ...]

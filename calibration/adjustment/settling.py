@@ -8,11 +8,17 @@ import numpy as np
 from scipy.stats import chi2
 
 from calibration.adjustment.components import Component, image_components
-from calibration.adjustment.levenberg import Solution
+from calibration.adjustment.levenberg import Solution, misfits
 from calibration.adjustment.network import Network
 from calibration.adjustment.options import CalibrationOptions
 from calibration.adjustment.reliability import Reliability
 from geometry.arrays import Bools, Floats
+
+LATE = 2.5
+LEAST_VIEWS = 5
+LEAST_IN_VIEW = 4
+"""A view (one camera, one place of a carrier) is late when half its points are off by more than
+this many times what is usual for the camera: nothing in the picture is wrong, but its moment."""
 
 BLUNDER_CHANCE = 0.01
 """Chance that a set of good observations loses one of them to the test."""
@@ -20,18 +26,29 @@ BLUNDER_CHANCE = 0.01
 MOST_LOST = 0.25
 """A camera whose model is wrong would lose its border; it may lose no more than this share."""
 
-OWN_FACTOR = 1.1
-"""A camera gets a sigma of its own when it differs from the others by this, and not by chance."""
+OWN_FACTOR = 1.25
+"""A camera gets a sigma of its own when it is worse than all together by this, not by chance."""
 
 
 def settle(
-    solution: Solution, network: Network, found: Reliability, options: CalibrationOptions
+    solution: Solution,
+    network: Network,
+    found: Reliability,
+    options: CalibrationOptions,
+    first: bool,
 ) -> tuple[Bools, Floats]:
-    """Blunders (n,), and factors (cameras,) by which stated sigmas are to be changed."""
+    """Blunders (n,), and factors (cameras,) by which stated sigmas are to be changed.
+
+    Cameras get sigmas of their own in the ``first`` round only. Repeated, the best would be
+    believed more and more: it would take the moving plates for itself, fit them ever better, and
+    drive the residuals into the others.
+    """
     count = network.camera_count
     bad = np.zeros(len(found.t), bool)
     if options.reject:
-        bad = _blunders(network, found, options.rescale)
+        bad = late_points(solution, network)
+        # Views go first: their points would each look like a blunder of its own.
+        bad = bad if bad.any() else _blunders(network, found, options.rescale)
     if not options.rescale:
         return bad, np.ones(count)
     # Good points count in full even where the loss holds them back: a camera that is noisier
@@ -39,19 +56,47 @@ def settle(
     good = np.where(bad, 0.0, 1.0)
     whole, *each = image_components(replace(solution, weights=good), network, _kept(found, ~bad))
     common = whole.factor if whole.significant else 1.0
+    if not first:
+        return bad, np.full(count, common)
     return bad, np.array([_factor(c, common) for c in each])
 
 
 def _factor(own: Component, common: float) -> float:
     relative = own.factor / common
     scatter = np.sqrt(2.0 / max(own.redundancy, 1.0))
-    if abs(relative**2 - 1.0) > 3.0 * scatter and max(relative, 1.0 / relative) > OWN_FACTOR:
+    if relative**2 - 1.0 > 3.0 * scatter and relative > OWN_FACTOR:
         return own.factor
     return common
 
 
 def _kept(found: Reliability, good: Bools) -> Reliability:
     return Reliability(found.redundancy * good[:, None], found.w, found.t)
+
+
+def late_points(solution: Solution, network: Network) -> Bools:
+    """Points (n,) of views that were taken at another moment than the other cameras' views.
+
+    Of each place the worst view only: the others may have suffered from it.
+    """
+    sight, misfit = network.sight, misfits(solution.residuals, network)
+    keys = sight.camera * network.pose_count + sight.pose
+    views, view = np.unique(keys, return_inverse=True)
+    view = view.reshape(-1)
+    middle = np.array([np.median(misfit[view == k]) for k in range(len(views))])
+    counts, camera, place = (
+        np.bincount(view),
+        views // network.pose_count,
+        views % network.pose_count,
+    )
+    late = np.zeros(len(views), bool)
+    for c in range(network.camera_count):
+        own = camera == c
+        if own.sum() >= LEAST_VIEWS:
+            late[own] = middle[own] > LATE * np.median(middle[own])
+    worst = np.zeros(network.pose_count)
+    np.maximum.at(worst, place, middle)
+    late &= (counts >= LEAST_IN_VIEW) & (middle >= worst[place])
+    return np.asarray(late[view])
 
 
 def _blunders(network: Network, found: Reliability, rescale: bool) -> Bools:
