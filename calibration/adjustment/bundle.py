@@ -114,7 +114,8 @@ def _adjusted(
     for round_ in range(ROUNDS + 1):
         covariance = solution.reduction.covariance()
         found = reliability(solution, covariance, network)
-        bad, change = settle(solution, network, found, options, round_ == 0)
+        equal = bool(np.ptp(factor) == 0.0)
+        bad, change = settle(solution, network, found, options, equal)
         settled = not (bad.any() or np.abs(change - 1.0).max() > SETTLED)
         if settled or round_ == ROUNDS or solution.stop is Stop.STUCK:
             break

@@ -35,13 +35,13 @@ def settle(
     network: Network,
     found: Reliability,
     options: CalibrationOptions,
-    first: bool,
+    equal: bool,
 ) -> tuple[Bools, Floats]:
     """Blunders (n,), and factors (cameras,) by which stated sigmas are to be changed.
 
-    Cameras get sigmas of their own in the ``first`` round only. Repeated, the best would be
-    believed more and more: it would take the moving plates for itself, fit them ever better, and
-    drive the residuals into the others.
+    Cameras get sigmas of their own once, when nothing bad is left and they have none yet
+    (``equal``). Repeated, the best would be believed more and more: it would take the moving
+    plates for itself, fit them ever better, and drive the residuals into the others.
     """
     count = network.camera_count
     bad = np.zeros(len(found.t), bool)
@@ -55,18 +55,21 @@ def settle(
     # than stated would otherwise seem half as noisy as it is.
     good = np.where(bad, 0.0, 1.0)
     whole, *each = image_components(replace(solution, weights=good), network, _kept(found, ~bad))
-    common = whole.factor if whole.significant else 1.0
-    if not first:
-        return bad, np.full(count, common)
-    return bad, np.array([_factor(c, common) for c in each])
+    if bad.any() or not equal:
+        return bad, np.full(count, whole.factor if whole.significant else 1.0)
+    return bad, _own_factors(each)
 
 
-def _factor(own: Component, common: float) -> float:
-    relative = own.factor / common
-    scatter = np.sqrt(2.0 / max(own.redundancy, 1.0))
-    if relative**2 - 1.0 > 3.0 * scatter and relative > OWN_FACTOR:
-        return own.factor
-    return common
+def _own_factors(each: list[Component]) -> Floats:
+    """Factors of cameras, common to all that are not much worse than the rest."""
+    factor = np.array([c.factor for c in each])
+    freedom = np.array([max(c.redundancy, 1.0) for c in each])
+    relative = factor / np.median(factor)
+    worse = (relative > OWN_FACTOR) & (relative**2 - 1.0 > 3.0 * np.sqrt(2.0 / freedom))
+    others = ~worse
+    pooled = float(np.sqrt(np.sum((factor**2 * freedom)[others]) / freedom[others].sum()))
+    shared = Component("", pooled, float(freedom[others].sum()), 0)
+    return np.where(worse, factor, pooled if shared.significant else 1.0)
 
 
 def _kept(found: Reliability, good: Bools) -> Reliability:
