@@ -91,9 +91,9 @@ def speed_text(found: Speed) -> str:
     ]
     return (
         "## Speed\n\n"
-        "9 cameras x 300 targets of unknown place, six distances, from a start 3 mm and 3 mrad off:\n"
-        f"{found.residuals} residuals, {found.unknowns} unknowns, {found.iterations} steps. One core, "
-        f"best of {REPEATS}.\n\n" + table(("what", "s", "asked, s"), rows)
+        "9 cameras x 300 targets of unknown place, six distances, a start 3 mm and 3 mrad off:\n"
+        f"{found.residuals} residuals, {found.unknowns} unknowns, {found.iterations} steps. One "
+        f"core, best of {REPEATS}.\n\n" + table(("what", "s", "asked, s"), rows)
     )
 
 

@@ -163,6 +163,18 @@ def test_a_blunder_is_found_named_and_left_out() -> None:
         np.testing.assert_allclose(a.interior.vector[:3], b.interior.vector[:3], atol=0.01)
 
 
+def test_a_view_taken_at_another_moment_is_left_out_whole_and_named() -> None:
+    place = SCENE.places[1][2]
+    late = {(3, 2): replace(place, shift_mm=place.shift_mm + np.array([0.4, 0.2, -0.3]))}
+    observations = replace(SCENE, seen_otherwise=late).observe(0.1, 12)
+    found = calibrate(observations, CalibrationOptions(start=SCENE.cameras, cross_validate=False))
+    assert [(v.camera, v.frame) for v in found.quality.late_views] == [("cam4", "frame3")]
+    plate = observations.targets.carrier_of[observations.target] == 1
+    own = plate & (observations.camera == 3) & (observations.frame == 2)
+    assert found.quality.rejected == own.sum()
+    assert "check the synchronisation" in found.quality.warnings[0]
+
+
 def test_smallest_blunders_follow_baarda(solved: tuple[Network, Solution]) -> None:
     network, solution = solved
     found = reliability(solution, solution.reduction.covariance(), network)
@@ -195,7 +207,8 @@ def test_one_noisy_camera_gets_a_sigma_of_its_own() -> None:
         replace(observations, pixel=pixel),
         CalibrationOptions(start=SCENE.cameras, cross_validate=False),
     )
-    assert found.sigma_factor[2] == pytest.approx(np.sqrt(0.1**2 + 0.3**2) / 0.1, rel=0.1)
+    # Estimated once, while all cameras still have equal weights: a little low, never high.
+    assert found.sigma_factor[2] == pytest.approx(np.sqrt(0.1**2 + 0.3**2) / 0.1, rel=0.15)
     assert np.abs(np.delete(found.sigma_factor, 2) - 1.0).max() < 0.1
 
 

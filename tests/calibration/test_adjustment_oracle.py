@@ -15,9 +15,9 @@ from calibration.adjustment.levenberg import LossOptions, Solution, adjust
 from calibration.adjustment.network import Network
 from calibration.adjustment.options import FREE, CalibrationOptions, InteriorModel
 from calibration.adjustment.start.finding import find_start
+from calibration.adjustment.start.resection import Placed
 from calibration.observations import TargetSet
 from calibration.synthetic import Scene, face_rig, stand
-from calibration.adjustment.start.resection import Placed
 from geometry.arrays import Floats
 
 SIGMA_PX = 0.1
@@ -135,7 +135,7 @@ def test_ceres_finds_the_same_with_the_same_sigmas() -> None:
 
 
 def project(camera: CalibratedCamera, values: Floats, points: Floats) -> Floats:
-    """Pixels by the library's own rotation and a plain formula: values f, cx, cy, k1, k2, C, turn."""
+    """Pixels by SciPy's rotation and a plain formula: values f, cx, cy, k1, k2, C, turn."""
     turn = Rotation.from_rotvec(values[8:11]).as_matrix() @ camera.pose.rotation_rig_to_camera
     local = (points - values[5:8]) @ turn.T
     x = local[:, :2] / local[:, 2:]

@@ -38,6 +38,7 @@ class Balanced(HTMLParser):
             self.open.append(tag)
 
     def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        assert attrs
         self.seen.append(tag)
 
     def handle_endtag(self, tag: str) -> None:

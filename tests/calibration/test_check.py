@@ -7,9 +7,9 @@ from dataclasses import replace
 import calibrations
 import numpy as np
 import pytest
-from benchmarks.drift import Bench
 from scipy.stats import kstest
 
+from benchmarks.drift import Bench
 from calibration.adjustment import CalibrationOptions, calibrate
 from calibration.adjustment.rotations import rotation_of
 from calibration.adjustment.start.resection import Placed
@@ -280,7 +280,6 @@ def test_sensitivity_is_baardas_and_the_test_keeps_it() -> None:
 
 def test_what_is_not_the_references_is_refused_in_one_line() -> None:
     reference, good = calibrations.small_reference(), SCENE.observe(0.1, 41)
-    rings, _ = SCENE.targets.carriers
     strange = TargetSet(
         "x", (Carrier("x", tuple(f"x{k}" for k in range(88)), np.zeros((88, 3)), np.ones((88, 3))),)
     )
