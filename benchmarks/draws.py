@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -124,19 +124,33 @@ def length_errors_um(
     return np.asarray(1e3 * (measured - np.array(LENGTHS_MM[1:])).ravel())
 
 
-def draw(
-    count: int,
-    sigma_px: float,
-    frames: int = 12,
-    rings: int = 60,
-    told: Callable[[int], None] = lambda _: None,
-) -> Draws:
-    """Calibrations of the 7-camera rig, each with a truth and noise of its own."""
+def drawn(count: int, sigma_px: float, processes: int) -> Draws:
+    """Calibrations of the 7-camera rig, shared out to processes."""
+    part = -(-count // (8 * processes))
+    firsts = range(0, count, part)
+    with ProcessPoolExecutor(processes) as pool:
+        waiting = [pool.submit(draw, min(part, count - f), sigma_px, first=f) for f in firsts]
+        parts = [w.result() for w in waiting]
+    lengths, floor = ([getattr(p, name) for p in parts] for name in ("length_um", "floor_um"))
+    return replace(
+        parts[0],
+        error=np.concatenate([p.error for p in parts]),
+        sigma=np.concatenate([p.sigma for p in parts]),
+        length_um=np.concatenate(lengths),
+        floor_um=np.concatenate(floor),
+    )
+
+
+def draw(count: int, sigma_px: float, frames: int = 12, rings: int = 60, first: int = 0) -> Draws:
+    """Calibrations of the 7-camera rig, each with a truth and noise of its own.
+
+    A draw's number, from ``first`` on, makes it what it is.
+    """
     scene = face_scene(frames=frames, rings=rings)
     points = len(WAYS) * len(LENGTHS_MM)
     error, sigma, lengths, floor = [], [], [], []
     predicted = free = None
-    for k in range(count):
+    for k in range(first, first + count):
         rng = np.random.default_rng([7, k])
         truth = redrawn(scene, rng)
         options = CalibrationOptions(start=scene.cameras, cross_validate=False)
@@ -150,7 +164,6 @@ def draw(
         noise = sigma_px * rng.normal(size=(len(scene.cameras), points, 2))
         lengths.append(length_errors_um(found.cameras, truth.cameras, noise, sigma_px))
         floor.append(length_errors_um(truth.cameras, truth.cameras, noise, sigma_px))
-        told(k)
     assert predicted is not None and free is not None  # noqa: S101 - count is positive
     return Draws(
         np.array(error), np.array(sigma), predicted, free, np.array(lengths), np.array(floor)

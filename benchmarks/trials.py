@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from calibration.check.checking import CheckOptions, judge
 from calibration.check.diagnosis import Prepared, diagnose
 from calibration.check.epoch import Epoch, epoch_of
 from calibration.check.gross import put_right
-from calibration.check.verdicts import CheckResult, Kind
+from calibration.check.verdicts import CheckResult, Kind, Light
 from calibration.synthetic import Scene, face_scene, plate_places, turned
 from geometry.arrays import Floats, Ints
 from geometry.frames import Pose
@@ -278,19 +278,24 @@ class Tally:
     named: int
     alone: int
 
+    def __add__(self, other: Tally) -> Tally:
+        """Both together."""
+        pairs = zip(astuple(self), astuple(other), strict=True)
+        return Tally(*(a + b for a, b in pairs))
 
-def run(bench: Bench, disturb: Disturb, trials: int, seed: int) -> Tally:
-    """Many trials with a fixed seed."""
-    alarmed = kind = named = alone = 0
-    for trial in range(trials):
+
+def run(bench: Bench, disturb: Disturb, trials: int, seed: int, first: int = 0) -> Tally:
+    """Trials from number ``first`` on; a trial's number and the seed make it what it is."""
+    total = Tally(0, 0, 0, 0, 0)
+    for trial in range(first, first + trials):
         rng = np.random.default_rng([seed, trial])
         disturbed = disturb(bench.scene, rng)
-        result = bench.trial(disturbed.scene, rng)
-        about = [f for f in result.findings if f.kind is disturbed.kind]
-        subjects = frozenset(s for f in about for s in f.subjects)
-        alarmed += result.light.value != "green"
-        kind += bool(about)
-        right = subjects == disturbed.subjects
-        named += right
-        alone += right and len(about) == len(result.findings)
-    return Tally(trials, alarmed, kind, named, alone)
+        total += _one(disturbed, bench.trial(disturbed.scene, rng))
+    return total
+
+
+def _one(disturbed: Disturbed, result: CheckResult) -> Tally:
+    about = [f for f in result.findings if f.kind is disturbed.kind]
+    right = frozenset(s for f in about for s in f.subjects) == disturbed.subjects
+    alone = right and len(about) == len(result.findings)
+    return Tally(1, result.light is not Light.GREEN, bool(about), right, alone)

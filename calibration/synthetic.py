@@ -107,7 +107,8 @@ class Scene:
 
     ``places`` has, for each carrier, its place in each frame; a fixed one has a single place.
     ``seen_otherwise`` maps (camera, frame) indices to a place in which that camera alone sees
-    the moving carriers: what a late trigger does.
+    the moving carriers: what a late trigger does. ``widest_deg``: a moving carrier is seen when its
+    front is turned from the camera by less than this; 180 for what can be seen from all sides.
     """
 
     cameras: tuple[CalibratedCamera, ...]
@@ -115,6 +116,7 @@ class Scene:
     true_mm: Floats
     places: tuple[tuple[Placed, ...], ...]
     seen_otherwise: Mapping[tuple[int, int], Placed] = field(default_factory=dict)
+    widest_deg: float = 65.0
 
     @property
     def frame_count(self) -> int:
@@ -170,13 +172,13 @@ class Scene:
         return np.concatenate(rows).astype(np.int64), np.concatenate(pixels)
 
     def _facing(self, camera: int, carrier: int, frame: int) -> bool:
-        """Whether a plate turns its front to the camera; everything else can be seen round."""
+        """Whether a moving carrier turns its front to the camera; what stands is seen all round."""
         if self.targets.carriers[carrier].fixed:
             return True
         place = self.places[carrier][frame]
         away = place.shift_mm - self.cameras[camera].pose.position_rig_mm
         cosine = float(place.rotation[:, 2] @ away / np.linalg.norm(away))
-        return cosine > float(np.cos(np.radians(65.0)))
+        return cosine >= float(np.cos(np.radians(self.widest_deg)))
 
     def with_cameras(self, cameras: tuple[CalibratedCamera, ...]) -> Scene:
         """The same scene with other cameras."""

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import io
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import escape
 
 import numpy as np
 
 from calibration.acceptance.lines import Acceptance, Outcome
+
+if TYPE_CHECKING:
+    from reportlab.graphics.shapes import Drawing
+    from reportlab.platypus import Flowable
 
 COLOURS = {Outcome.PASSED: "#1a7f37", Outcome.FAILED: "#b42318", Outcome.INCOMPLETE: "#9a6700"}
 DISCLAIMER = (
@@ -53,7 +57,7 @@ def certificate_pdf(acceptance: Acceptance, heading: Heading | None = None) -> b
         invariant=1,
     )
     colour = COLOURS[acceptance.outcome]
-    story: list[Any] = [
+    story: list[Flowable] = [
         Paragraph("Length acceptance test", styles["Title"]),
         _facts(acceptance, heading or Heading()),
         Spacer(1, 5 * mm),
@@ -73,7 +77,7 @@ def certificate_pdf(acceptance: Acceptance, heading: Heading | None = None) -> b
     return sheet.getvalue()
 
 
-def _facts(acceptance: Acceptance, heading: Heading) -> Any:  # noqa: ANN401 - reportlab has no types here
+def _facts(acceptance: Acceptance, heading: Heading) -> Flowable:
     from reportlab.platypus import Table
 
     limit, volume = acceptance.limit, acceptance.volume
@@ -102,7 +106,7 @@ def _facts(acceptance: Acceptance, heading: Heading) -> Any:  # noqa: ANN401 - r
     return Table(shown, colWidths=(110, 370), style=[("FONTSIZE", (0, 0), (-1, -1), 9)])
 
 
-def _table(acceptance: Acceptance) -> Any:  # noqa: ANN401 - reportlab has no types here
+def _table(acceptance: Acceptance) -> Flowable:
     from reportlab.lib import colors
     from reportlab.platypus import Table
 
@@ -131,7 +135,7 @@ def _table(acceptance: Acceptance) -> Any:  # noqa: ANN401 - reportlab has no ty
     return Table([head, *rows], repeatRows=1, style=style)
 
 
-def _plot(acceptance: Acceptance) -> Any:  # noqa: ANN401 - reportlab has no types here
+def _plot(acceptance: Acceptance) -> Drawing:
     """Errors over lengths between the limits."""
     from reportlab.graphics.shapes import Circle, Drawing, Line, PolyLine, String
     from reportlab.lib.colors import HexColor, grey

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
+from scipy.optimize import brentq
 from scipy.stats import chi2, ncx2
 
 from calibration.adjustment.camera import INTERIOR, PER_CAMERA
@@ -252,12 +254,11 @@ def _point_spread(diagnosis: Diagnosis) -> Floats:
 def power95_factor(diagnosis: Diagnosis) -> float:
     """How many sensitivities a movement needs to be reported in 95 % of checks."""
     poses = [k for k, h in enumerate(diagnosis.tests.hypotheses) if h.cause is Cause.POSE]
-    limit = max(diagnosis.tests.limit(k) for k in poses)
-    low, high = 0.0, 1000.0
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        if ncx2.sf(limit, 6, middle) < 0.95:
-            low = middle
-        else:
-            high = middle
-    return float(np.sqrt(high) / DELTA0)
+    return _factor_at(max(diagnosis.tests.limit(k) for k in poses))
+
+
+@cache
+def _factor_at(limit: float) -> float:
+    """The factor for a limit of the pose test: checks of one rig share it."""
+    noncentrality = brentq(lambda nc: ncx2.sf(limit, 6, nc) - 0.95, 1.0, 1000.0)
+    return float(np.sqrt(noncentrality) / DELTA0)

@@ -23,13 +23,8 @@ WAYS = np.array(
 GENEROUS = LengthLimit(60.0, 50.0, 80.0)
 
 
-@pytest.fixture(autouse=True)
-def seen_from_all_sides(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A bar with targets that cameras see from any side."""
-    monkeypatch.setattr(Scene, "_facing", lambda *_: True)
-
-
 def bar_scene(lines: int = 7, scale: float = 1.0, targets: int = 6) -> Scene:
+    """A bar with targets that cameras see from any side."""
     nominal = np.c_[PLACES_MM[:targets] - 165.0, np.zeros((targets, 2))]
     bar = Carrier(
         "bar", tuple(f"b{k}" for k in range(targets)), nominal, np.full((targets, 3), 1e-3)
@@ -42,6 +37,7 @@ def bar_scene(lines: int = 7, scale: float = 1.0, targets: int = 6) -> Scene:
         TargetSet("bar", (bar,)),
         scale * nominal,
         (tuple(places),),
+        widest_deg=180.0,
     )
 
 

@@ -84,8 +84,8 @@ def test_the_calibration_page_has_all_cameras() -> None:
 
 def test_the_history_shows_which_camera_drifts() -> None:
     records = [
-        CheckRecord("rig", f"2026-11-{20 - k:02d}T10:00:00Z", moved_check(3.0 * (8 - k), k))
-        for k in range(8)
+        CheckRecord("rig", f"2026-11-{20 - k:02d}T10:00:00Z", moved_check(6.0 * (4 - k), k))
+        for k in range(4)
     ]
     records.append(replace(records[0], reference="another"))
     history = history_of(records, "rig")
@@ -96,7 +96,7 @@ def test_the_history_shows_which_camera_drifts() -> None:
     others = [max(c.load) for k, c in enumerate(history.cameras) if k != 2]
     assert drifting.load[-1] > 2.0 * max(others)
     figure = ET.fromstring(history_svg(history))  # noqa: S314 - written by ourselves
-    assert len(figure.findall("circle")) == 5 * 8
+    assert len(figure.findall("circle")) == 5 * 4
     parsed(history_page(history))
 
 

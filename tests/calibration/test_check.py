@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.stats import kstest
 
-from benchmarks.drift import Bench
+from benchmarks.trials import Bench
 from calibration.adjustment import CalibrationOptions, calibrate
 from calibration.adjustment.rotations import rotation_of
 from calibration.adjustment.start.resection import Placed
@@ -202,7 +202,8 @@ def test_single_blunders_are_left_out_and_alarm_nobody() -> None:
     pixel[[50, 600, 900]] += [[9.0, 0.0], [0.0, -30.0], [2.0, 2.0]]
     result = check(calibrations.small_reference(), replace(observations, pixel=pixel))
     assert result.kinds == (Kind.FINE,)
-    assert result.outliers == 3
+    # In one check of a hundred a good point is taken for a blunder: it would be so again.
+    assert result.outliers == checked(SCENE).outliers + 3
 
 
 def test_of_two_cameras_nobody_can_say_which_moved() -> None:
@@ -254,18 +255,19 @@ def test_statistics_of_an_unchanged_rig_are_chi_square_reference_error_included(
     poses = [k for k, h in enumerate(bench.prepared.tests.hypotheses) if h.cause is Cause.POSE]
     _, exact = bench.scene.exact()
     values = []
-    for seed in range(200):
+    for seed in range(80):
         rng = np.random.default_rng(seed)
         drawn = bench.epoch.reference.drawn(rng)
         epoch = bench.epoch.with_pixels(exact + 0.1 * rng.normal(size=exact.shape), drawn)
         found = diagnose(epoch, put_right(epoch).start.state, (), bench.prepared)
         values.append(found.outcomes.statistic[poses[seed % len(poses)]])
     assert kstest(values, "chi2", args=(6,)).pvalue > 1e-3
-    # The mean of 200 scatters by sqrt(12 / 200) = 0.24; without the reference's own uncertainty
-    # it would be far above 6.
-    assert np.mean(values) == pytest.approx(6.0, abs=0.8)
+    # The mean of 80 scatters by sqrt(12 / 80) = 0.39; three of those. Without the reference's own
+    # uncertainty it would be far above 6.
+    assert np.mean(values) == pytest.approx(6.0, abs=1.2)
 
 
+@pytest.mark.slow
 def test_sensitivity_is_baardas_and_the_test_keeps_it() -> None:
     """A movement of power95_factor sensitivities is reported in about 95 of 100 checks."""
     result = checked(SCENE)
