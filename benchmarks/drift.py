@@ -134,10 +134,10 @@ def measured(pool: ProcessPoolExecutor, count: int, nothing: int) -> str:
     """All tables."""
     about = (
         f"{count} trials in each row, image noise {SIGMA_PX} px. Every trial draws a reference "
-        "from\nits covariance (so that its own uncertainty is in the test), disturbs the rig,\n"
-        "observes it and runs the check as shipped. Reported: the light is not green. Own verdict:\n"
-        "the right kind is among the findings. Named: about exactly the right cameras or targets.\n"
-        "Alone: and nothing else was found.\n"
+        "from\nits covariance (so that its own uncertainty is in the test), disturbs the rig, "
+        "observes it and\nruns the check as shipped. Reported: the light is not green. Own "
+        "verdict: the right kind is\namong the findings. Named: about exactly the right cameras "
+        "or targets. Alone: and nothing else\nwas found.\n"
     )
     usual, quick = (len(bench(name).epoch.pixel) for name in (USUAL, QUICK))
     head = ("check", "turn across the view", "roll", "shift across", "along")
