@@ -30,6 +30,13 @@ def numbers(values: Floats) -> str:
     return " ".join(number(v) for v in np.asarray(values).ravel())
 
 
+def number_lists(values: Floats) -> str:
+    """A vector or matrix as (nested) lists, as JSON, TOML and YAML have them."""
+    if values.ndim > 1:
+        return "[" + ", ".join(number_lists(row) for row in values) + "]"
+    return "[" + ", ".join(number(v) for v in values) + "]"
+
+
 def quaternion_wxyz(rotation: Floats) -> Floats:
     """Unit quaternion w, x, y, z (Hamilton) of a rotation (3, 3), (4,); w is not negative."""
     from scipy.spatial.transform import Rotation

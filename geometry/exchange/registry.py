@@ -10,8 +10,10 @@ from pathlib import Path
 from geometry.errors import ConflictError, InputError, NotFoundError
 from geometry.exchange import (
     blender,
+    caliscope,
     colmap,
     gltf,
+    kalibr,
     meshroom,
     metashape,
     nerfstudio,
@@ -35,6 +37,8 @@ FORMATS: dict[str, Format] = {
         blender.FORMAT,
         gltf.FORMAT,
         usd.FORMAT,
+        kalibr.FORMAT,
+        caliscope.FORMAT,
     )
 }
 """Exports by the name a user chooses them with."""

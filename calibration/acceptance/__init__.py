@@ -1,0 +1,15 @@
+"""Whether a calibrated rig measures lengths as well as it should."""
+
+from calibration.acceptance.accepting import accept
+from calibration.acceptance.certificate import certificate_pdf
+from calibration.acceptance.lines import Acceptance, LengthLimit, MeasuredLength, Outcome, Volume
+
+__all__ = [
+    "accept",
+    "Acceptance",
+    "certificate_pdf",
+    "LengthLimit",
+    "MeasuredLength",
+    "Outcome",
+    "Volume",
+]

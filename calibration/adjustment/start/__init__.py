@@ -1,0 +1,1 @@
+"""Start values: interiors, poses of cameras and carriers, unknown targets, from images alone."""

@@ -1,0 +1,222 @@
+"""The check: new images against a stored calibration."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from calibration.adjustment.result import Calibration
+from calibration.check import words
+from calibration.check.diagnosis import Diagnosis, diagnose
+from calibration.check.effects import effects
+from calibration.check.epoch import Epoch, epoch_of
+from calibration.check.findings import findings, scale_estimate
+from calibration.check.gross import Righted, put_right
+from calibration.check.hypotheses import ALPHA, Cause
+from calibration.check.tables import (
+    LEAST_POINTS,
+    Noise,
+    camera_checks,
+    carrier_checks,
+    length_checks,
+    noise_of,
+    power95_factor,
+)
+from calibration.check.verdicts import (
+    STOPPING,
+    CameraCheck,
+    CheckResult,
+    Finding,
+    Kind,
+    Light,
+)
+from calibration.observations import Observations
+from geometry.errors import CancelledError, InputError
+from solver.progress import CancelToken, NeverCancelled, Progress, ProgressCallback, ignore_progress
+
+UNEXPLAINED = 2.0
+"""What is left may not be more than this many times the expected misfit."""
+
+SHIFT_NOTE_MM = 0.05
+
+
+@dataclass(frozen=True)
+class CheckOptions:
+    """What matters at the subject.
+
+    ``hidden_limit_mm``: a camera of which larger effects could hide is not called fine.
+    ``tolerance_mm``: smaller effects are told, but do not turn the light red. A face needs 0.05 mm
+    at most; 0.02 mm is comfortable.
+    """
+
+    hidden_limit_mm: float = 0.1
+    tolerance_mm: float = 0.02
+
+    def __post_init__(self) -> None:
+        if not (self.hidden_limit_mm > 0.0 and self.tolerance_mm >= 0.0):
+            raise InputError(
+                "check-limit",
+                "hidden_limit_mm must be positive and tolerance_mm not negative",
+                "give lengths in millimetres",
+            )
+
+
+def check(
+    reference: Calibration,
+    observations: Observations,
+    options: CheckOptions | None = None,
+    progress: ProgressCallback = ignore_progress,
+    cancel: CancelToken | None = None,
+) -> CheckResult:
+    """What changed since the reference was made: which camera, lens, target; or nothing.
+
+    Raises :class:`InputError` when the observations are not of the reference's rig and targets,
+    and :class:`CancelledError`.
+    """
+    cancel = cancel or NeverCancelled()
+    progress(Progress("reading", 0.0))
+    epoch = epoch_of(reference, observations)
+    _go_on(cancel)
+    progress(Progress("gross faults", 0.2))
+    righted = put_right(epoch)
+    _go_on(cancel)
+    progress(Progress("tests", 0.4))
+    diagnosis = diagnose(righted.epoch, righted.start.state, righted.suspects)
+    _go_on(cancel)
+    progress(Progress("verdict", 0.9))
+    return judge(reference, observations, epoch, righted, diagnosis, options or CheckOptions())
+
+
+def _go_on(cancel: CancelToken) -> None:
+    if cancel.is_set():
+        raise CancelledError
+
+
+def judge(
+    reference: Calibration,
+    observations: Observations,
+    epoch: Epoch,
+    righted: Righted,
+    diagnosis: Diagnosis,
+    options: CheckOptions,
+) -> CheckResult:
+    """All tables and findings of a finished diagnosis."""
+    found = effects(diagnosis.epoch, diagnosis.first.state)
+    noise = noise_of(diagnosis)
+    alarms = [_weighed(f, options) for f in findings(righted, diagnosis, found)]
+    cameras = camera_checks(diagnosis, found, noise, options.hidden_limit_mm)
+    told = verdicts(alarms, cameras, noise, diagnosis)
+    scale, scale_sigma = _scale(diagnosis)
+    distances = reference.targets.distances or observations.targets.distances
+    residual = diagnosis.first.v * _sigmas(diagnosis)
+    return CheckResult(
+        _light(told),
+        told,
+        cameras,
+        carrier_checks(diagnosis, reference, told),
+        length_checks(diagnosis, righted.start, distances, scale_sigma),
+        diagnosis.first.chi2,
+        2 * len(diagnosis.first.v) - 6 * len(epoch.place_carrier),
+        float(np.sqrt(np.mean(residual**2))),
+        1e6 * scale,
+        1e6 * scale_sigma,
+        power95_factor(diagnosis),
+        ALPHA,
+        len(epoch.pixel),
+        len(np.unique(epoch.place_frame[epoch.moving])) or 1,
+        diagnosis.outliers,
+        _notes(epoch, diagnosis, reference),
+    )
+
+
+def _weighed(finding: Finding, options: CheckOptions) -> Finding:
+    """The finding, marked as tolerable when its effect at the subject is."""
+    if finding.kind not in STOPPING or not finding.effect_mm < options.tolerance_mm:
+        return finding
+    more = f" That is less than the {words.length(options.tolerance_mm)} that matter."
+    return replace(finding, tolerable=True, sentence=finding.sentence + more)
+
+
+def _sigmas(diagnosis: Diagnosis) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+    return diagnosis.first.linear.epoch.sigma_px
+
+
+def _light(told: tuple[Finding, ...]) -> Light:
+    lights = {f.light for f in told}
+    for light in (Light.RED, Light.YELLOW):
+        if light in lights:
+            return light
+    return Light.GREEN
+
+
+def _scale(diagnosis: Diagnosis) -> tuple[float, float]:
+    together = scale_estimate(diagnosis, Cause.ALL_SCALE, 0)
+    if np.isfinite(together[0]):
+        return together
+    carrier = int(diagnosis.epoch.place_carrier[0])
+    return scale_estimate(diagnosis, Cause.SCALE, carrier)
+
+
+def verdicts(
+    alarms: list[Finding],
+    cameras: tuple[CameraCheck, ...],
+    noise: Noise,
+    diagnosis: Diagnosis,
+) -> tuple[Finding, ...]:
+    """Alarms, then doubts; or that all is fine."""
+    told = list(alarms)
+    names = diagnosis.epoch.camera_names
+    freedom = 2 * len(diagnosis.last.v)
+    ratio = float(np.sqrt(diagnosis.last.chi2 / max(freedom, 1)))
+    if ratio > UNEXPLAINED:
+        told.insert(0, Finding(Kind.UNEXPLAINED, names, words.unexplained(ratio), value=ratio))
+    else:
+        for k in np.flatnonzero(noise.raised()):
+            factor = float(noise.factor[k])
+            told.append(
+                Finding(
+                    Kind.NOISE_RAISED,
+                    (names[k],),
+                    words.noise(names[k], factor),
+                    log10_p=float(np.log10(max(noise.p[k], 1e-300))),
+                    value=factor,
+                )
+            )
+    told += _doubts(cameras)
+    if not told:
+        hidden = max(c.sensitivity.hidden_mm for c in cameras if c.sensitivity)
+        hidden *= power95_factor(diagnosis)
+        told.append(Finding(Kind.FINE, names, words.fine(len(names), hidden), effect_mm=hidden))
+    return tuple(told)
+
+
+def _doubts(cameras: tuple[CameraCheck, ...]) -> list[Finding]:
+    out = []
+    unsure = [c for c in cameras if c.verdict is Kind.CANNOT_TELL]
+    few = tuple(c.name for c in unsure if c.points < LEAST_POINTS or c.sensitivity is None)
+    weak = [c for c in unsure if c.name not in few]
+    if few:
+        out.append(Finding(Kind.CANNOT_TELL, few, words.few(few, LEAST_POINTS)))
+    if weak:
+        names = tuple(c.name for c in weak)
+        hidden = max(c.sensitivity.hidden_mm for c in weak if c.sensitivity)
+        out.append(Finding(Kind.CANNOT_TELL, names, words.weak(names, hidden), effect_mm=hidden))
+    return out
+
+
+def _notes(epoch: Epoch, diagnosis: Diagnosis, reference: Calibration) -> tuple[str, ...]:
+    out = []
+    if diagnosis.outliers:
+        out.append(f"{diagnosis.outliers} image points were left out as single blunders.")
+    if epoch.unknown_rows:
+        out.append(
+            f"{epoch.unknown_rows} image points of targets unknown to the reference were left out."
+        )
+    out += [
+        f"{row.name} stands {words.length(row.shift_mm)} from where it stood before the same "
+        "cameras; that does no harm."
+        for row in carrier_checks(diagnosis, reference, ())
+        if row.shift_mm > SHIFT_NOTE_MM
+    ]
+    return tuple(out)

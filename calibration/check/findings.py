@@ -1,0 +1,279 @@
+"""From accepted causes to findings."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from dataclasses import dataclass
+
+import numpy as np
+
+from calibration.adjustment.camera import INTERIOR
+from calibration.check import words
+from calibration.check.diagnosis import Diagnosis
+from calibration.check.effects import Effects
+from calibration.check.gross import Righted
+from calibration.check.hypotheses import Cause, Hypothesis, log_tail
+from calibration.check.scores import estimate
+from calibration.check.verdicts import Finding, Kind
+from geometry.arrays import Floats
+
+LOG10 = float(np.log(10.0))
+RIVAL = 10.0
+"""Another camera whose statistic comes this near would explain the images almost as well."""
+
+TIE = 0.01
+FACE_MM = 200.0
+MANY_TARGETS = 4
+SYNC = (Cause.VIEW, Cause.CAMERA_SYNC, Cause.PLACE_SYNC)
+
+
+@dataclass(frozen=True, eq=False)
+class Change:
+    """An accepted cause, the change (d,) along its directions, and its test."""
+
+    cause: Hypothesis
+    change: Floats
+    statistic: float
+    dof: int
+
+    @property
+    def log10_p(self) -> float:
+        """Decimal logarithm of the chance of such a statistic when nothing happened."""
+        return log_tail(self.statistic, self.dof) / LOG10
+
+
+def changes(diagnosis: Diagnosis) -> tuple[Change, ...]:
+    """The accepted causes with their sizes, from the fit in which all are free."""
+    out = []
+    index = {id(h): k for k, h in enumerate(diagnosis.tests.hypotheses)}
+    first = len(diagnosis.last.unknowns) - diagnosis.last.linear.freed.shape[1]
+    for cause in diagnosis.accepted:
+        size = cause.ways.shape[1]
+        k = index[id(cause)]
+        out.append(
+            Change(
+                cause,
+                diagnosis.last.unknowns[first : first + size],
+                float(diagnosis.outcomes.statistic[k]),
+                int(diagnosis.tests.dof[k]),
+            )
+        )
+        first += size
+    return tuple(out)
+
+
+def findings(righted: Righted, diagnosis: Diagnosis, found: Effects) -> list[Finding]:
+    """All findings of alarming kinds, gross ones first."""
+    out = _gross(righted, diagnosis)
+    done = changes(diagnosis)
+    by_carrier: dict[int, list[Change]] = defaultdict(list)
+    sync = []
+    for one in done:
+        cause = one.cause.cause
+        if cause is Cause.POSE:
+            out.append(_camera(one, diagnosis, found))
+        elif cause is Cause.LENS:
+            out.append(_lens(one, diagnosis, found))
+        elif cause is Cause.TARGET:
+            by_carrier[int(diagnosis.epoch.target_carrier[one.cause.subject])].append(one)
+        elif cause in (Cause.BEND, Cause.SHAPE):
+            out.append(_bent(one, diagnosis, found))
+        elif cause in (Cause.SCALE, Cause.ALL_SCALE):
+            out.append(_scale(one, diagnosis, righted, found))
+        else:
+            sync.append(one)
+    for carrier, group in by_carrier.items():
+        out.append(_targets(carrier, group, diagnosis, found))
+    if sync:
+        out.append(_unsynchronised(sync, diagnosis))
+    return out
+
+
+def _gross(righted: Righted, diagnosis: Diagnosis) -> list[Finding]:
+    epoch = righted.epoch
+    out = []
+    for cycle in righted.cameras:
+        names = tuple(epoch.camera_names[k] for k in cycle)
+        out.append(Finding(Kind.CAMERAS_SWAPPED, names, words.cameras_swapped(names)))
+    if righted.ids:
+        pairs = tuple((epoch.target_names[a], epoch.target_names[b]) for a, b in righted.ids)
+        out.append(Finding(Kind.IDS_SWAPPED, tuple(a for a, _ in pairs), words.ids(pairs)))
+    free = {h.cause.subject: h for h in changes(diagnosis) if h.cause.cause is Cause.SCALE}
+    for carrier, scale in righted.scales:
+        if carrier not in free:
+            out.append(_printed(carrier, scale, 0.0, diagnosis))
+    return out
+
+
+def scale_estimate(diagnosis: Diagnosis, cause: Cause, subject: int) -> tuple[float, float]:
+    """Relative size of a carrier (or of all) against the reference, less 1, and its sigma."""
+    first = diagnosis.first
+    for h in diagnosis.tests.hypotheses:
+        if h.cause is cause and h.subject == subject:
+            change, covariance = estimate(h, first.linear, first.score)
+            return float(change[0]), float(np.sqrt(covariance[0, 0]))
+    return float("nan"), float("nan")
+
+
+def _printed(carrier: int, scale: float, more: float, diagnosis: Diagnosis) -> Finding:
+    name = diagnosis.epoch.carrier_names[carrier]
+    rest, sigma = scale_estimate(diagnosis, Cause.SCALE, carrier)
+    value = scale * (1.0 + (more or rest))
+    statistic = ((value - 1.0) / sigma) ** 2
+    return Finding(
+        Kind.PRINT_SCALE,
+        (name,),
+        words.printed(name, value),
+        statistic,
+        1,
+        log_tail(statistic, 1) / LOG10,
+        value=value,
+        sigma=sigma,
+    )
+
+
+def _scale(one: Change, diagnosis: Diagnosis, righted: Righted, found: Effects) -> Finding:
+    if one.cause.cause is Cause.SCALE:
+        before = dict(righted.scales).get(one.cause.subject, 1.0)
+        return _printed(one.cause.subject, before, float(one.change[0]), diagnosis)
+    value, (_, sigma) = float(one.change[0]), scale_estimate(diagnosis, Cause.ALL_SCALE, 0)
+    # What a face's width gets wrong by it.
+    effect_mm = abs(value) * FACE_MM
+    return Finding(
+        Kind.SCALE_CHANGED,
+        diagnosis.epoch.carrier_names,
+        words.scale(1e6 * value),
+        one.statistic,
+        one.dof,
+        one.log10_p,
+        effect_mm / found.gsd_mm,
+        effect_mm,
+        value=1.0 + value,
+        sigma=sigma,
+    )
+
+
+def _camera(one: Change, diagnosis: Diagnosis, found: Effects) -> Finding:
+    camera = one.cause.subject
+    names = diagnosis.epoch.camera_names
+    px, mm = found.of(camera, one.change, INTERIOR)
+    rivals, tied = _rivals(one, diagnosis)
+    kind, sentence = Kind.CAMERA_MOVED, words.moved(names[camera], px, mm)
+    subjects: tuple[str, ...] = (names[camera],)
+    if tied:
+        subjects = (names[camera], *tied)
+        kind, sentence = Kind.CANNOT_TELL, words.either(subjects)
+    return Finding(
+        kind, subjects, sentence, one.statistic, one.dof, one.log10_p, px, mm, candidates=rivals
+    )
+
+
+def _rivals(one: Change, diagnosis: Diagnosis) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Cameras that would explain the images almost as well, and those that do exactly so."""
+    rivals, tied = [], []
+    for k, h in enumerate(diagnosis.tests.hypotheses):
+        if (
+            h.cause is not Cause.POSE
+            or h.subject == one.cause.subject
+            or len(diagnosis.accepted) > 1
+        ):
+            continue
+        short = one.statistic - float(diagnosis.outcomes.statistic[k])
+        name = diagnosis.epoch.camera_names[h.subject]
+        if abs(short) < TIE * one.statistic:
+            tied.append(name)
+        elif short < RIVAL:
+            rivals.append(name)
+    return tuple(rivals), tuple(tied)
+
+
+def _lens(one: Change, diagnosis: Diagnosis, found: Effects) -> Finding:
+    camera = one.cause.subject
+    name = diagnosis.epoch.camera_names[camera]
+    px, mm = found.of(camera, one.change, 0)
+    share = float(one.change[0] / diagnosis.epoch.reference.interior[camera, 0])
+    return Finding(
+        Kind.LENS_CHANGED,
+        (name,),
+        words.lens(name, px, mm, share),
+        one.statistic,
+        one.dof,
+        one.log10_p,
+        px,
+        mm,
+        value=share,
+    )
+
+
+def _displacement_mm(one: Change) -> float:
+    """Largest displacement of a target by a change of its carrier's shape."""
+    moves = (one.cause.ways @ one.change).reshape(-1, 3)
+    # A bend has its rigid part and its size in common with the carrier's place.
+    moves = moves - moves.mean(axis=0) if len(moves) > 1 else moves
+    return float(np.linalg.norm(moves, axis=1).max())
+
+
+def _bent(one: Change, diagnosis: Diagnosis, found: Effects) -> Finding:
+    name = diagnosis.epoch.carrier_names[one.cause.subject]
+    mm = _displacement_mm(one)
+    return Finding(
+        Kind.CARRIER_BENT,
+        (name,),
+        words.bent(name, mm),
+        one.statistic,
+        one.dof,
+        one.log10_p,
+        mm / found.gsd_mm,
+        mm,
+    )
+
+
+def _targets(carrier: int, group: list[Change], diagnosis: Diagnosis, found: Effects) -> Finding:
+    epoch = diagnosis.epoch
+    worst = max(group, key=lambda one: one.statistic)
+    mm = max(_displacement_mm(one) for one in group)
+    name = epoch.carrier_names[carrier]
+    targets = tuple(epoch.target_names[one.cause.subject] for one in group)
+    kind, subjects = Kind.TARGET_MOVED, targets
+    sentence = words.target_moved(targets, name, mm)
+    if len(group) > max(MANY_TARGETS, int(0.2 * np.sum(epoch.target_carrier == carrier))):
+        kind, subjects, sentence = Kind.CARRIER_BENT, (name,), words.bent(name, mm)
+    return Finding(
+        kind,
+        subjects,
+        sentence,
+        worst.statistic,
+        worst.dof,
+        worst.log10_p,
+        mm / found.gsd_mm,
+        mm,
+    )
+
+
+def _unsynchronised(group: list[Change], diagnosis: Diagnosis) -> Finding:
+    epoch, base = diagnosis.epoch, diagnosis.last.linear.columns
+    cameras: set[int] = set()
+    frames: set[int] = set()
+    largest = 0.0
+    for one in group:
+        views = np.unique((one.cause.columns - base.reference) // 6)
+        if one.cause.cause is not Cause.PLACE_SYNC:
+            cameras |= {int(c) for c in epoch.view_camera[views]}
+        if one.cause.cause is not Cause.CAMERA_SYNC:
+            frames |= {int(f) for f in epoch.place_frame[epoch.view_place[views]]}
+        shift = diagnosis.last.linear.design @ (one.cause.directions(base.count) @ one.change)
+        shifts = np.linalg.norm(np.asarray(shift).reshape(-1, 2) * epoch.sigma_px, axis=1)
+        largest = max(largest, float(shifts.max()))
+    named = tuple(epoch.camera_names[c] for c in sorted(cameras))
+    when = tuple(epoch.frame_names[f] for f in sorted(frames))
+    worst = max(group, key=lambda one: one.statistic)
+    sentence = words.unsynchronised(named or ("the cameras",), when, largest)
+    return Finding(
+        Kind.UNSYNCHRONISED,
+        named or when,
+        sentence,
+        worst.statistic,
+        worst.dof,
+        worst.log10_p,
+        largest,
+    )

@@ -1,0 +1,266 @@
+"""HTML pages that a technician understands: the verdict first, then why."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from html import escape
+
+from calibration.adjustment.result import Calibration
+from calibration.check.verdicts import CameraCheck, CheckResult, Kind, Light
+from calibration.files.checkfile import CheckRecord
+from calibration.report.history import History, history_svg
+from calibration.report.svg import GREEN, RED, YELLOW, Series, chart, residual_plot
+
+STYLE = """
+body{font:15px/1.5 system-ui,sans-serif;color:#1f2933;max-width:1000px}
+body{margin:2rem auto;padding:0 1rem}
+h1{font-size:1.5rem}h2{font-size:1.1rem;margin-top:2rem}
+table{border-collapse:collapse;width:100%;font-variant-numeric:tabular-nums}
+th,td{padding:.25rem .5rem;text-align:right;border-bottom:1px solid #e2e8ee}
+th:first-child,td:first-child{text-align:left}th{font-weight:600;vertical-align:bottom}
+.light{display:inline-block;width:1.6rem;height:1.6rem;border-radius:50%;vertical-align:middle}
+.finding{border-left:.35rem solid;padding:.4rem .8rem;margin:.6rem 0;background:#f6f8fa}
+.plots{display:flex;flex-wrap:wrap;gap:1rem}.plots figure{width:300px;margin:0}
+figcaption,small,.note{color:#52606d;font-size:.85rem}svg{max-width:100%;height:auto}
+"""
+POLICY = "default-src 'none'; style-src 'unsafe-inline'"
+COLOURS = {Light.GREEN: GREEN, Light.YELLOW: YELLOW, Light.RED: RED}
+HEADLINES = {
+    Light.GREEN: "Fine: go on working",
+    Light.YELLOW: "Look before you go on",
+    Light.RED: "Stop: something has changed",
+}
+
+
+def page(title: str, parts: Iterable[str]) -> str:
+    """A whole document that loads nothing from anywhere."""
+    return (
+        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
+        f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">'
+        '<meta name="viewport" content="width=device-width">'
+        f"<title>{escape(title)}</title><style>{STYLE}</style></head><body>"
+        f"{''.join(parts)}</body></html>\n"
+    )
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A table of texts, escaped here."""
+    cells = "".join(f"<th>{escape(h)}</th>" for h in head)
+    body = "".join("<tr>" + "".join(f"<td>{escape(c)}</td>" for c in row) + "</tr>" for row in rows)
+    return f"<table><thead><tr>{cells}</tr></thead><tbody>{body}</tbody></table>"
+
+
+def number(value: float, digits: int = 3) -> str:
+    """A number with so many significant digits, a dash for none."""
+    if value != value:
+        return "-"
+    return f"{value:.{digits}g}" if abs(value) < 1e5 else f"{value:.2e}"
+
+
+def light(colour: Light) -> str:
+    """A traffic light's lamp, with its word for those who do not see it."""
+    style = f"background:{COLOURS[colour]}"
+    return f'<span class="light" role="img" aria-label="{colour.value}" style="{style}"></span>'
+
+
+def finding(sentence: str, colour: str) -> str:
+    """A sentence with a coloured edge."""
+    return f'<div class="finding" style="border-color:{colour}">{escape(sentence)}</div>'
+
+
+def check_page(record: CheckRecord, reference: Calibration | None = None) -> str:
+    """One check: light, findings, cameras, carriers, lengths, residuals.
+
+    ``reference`` gives the image sizes for the residual plots; without it there are none.
+    """
+    result = record.result
+    title = f"Calibration check {record.made_utc}".strip()
+    parts = [
+        f"<h1>{light(result.light)} {escape(HEADLINES[result.light])}</h1>",
+        f"<p>Reference: {escape(record.reference or 'unnamed')}. {escape(record.made_utc)}</p>",
+        *(finding(f.sentence, COLOURS[f.light]) for f in result.findings),
+        *(f'<p class="note">{escape(note)}</p>' for note in result.notes),
+        "<h2>Cameras</h2>",
+        _camera_table(result.cameras),
+        f'<p class="note">Load: the pose test over its limit, an alarm above 1. Smallest: what '
+        "this check could have seen of a movement (Baarda, delta0 4.13); "
+        f"{result.power95_factor:.1f} times as much is reported in 95 of 100 checks.</p>",
+        "<h2>Targets</h2>",
+        _carrier_table(result),
+    ]
+    if result.lengths:
+        parts += ["<h2>Measured distances</h2>", _length_table(result)]
+    if reference is not None:
+        parts += ["<h2>Residuals over the images</h2>", _residuals(result.cameras, reference)]
+    parts.append(
+        f'<p class="note">{result.points} image points in {result.frames} frames, chi-square '
+        f"{result.chi2:.0f} of {result.dof}, {result.rms_px:.3f} px rms; scale "
+        f"{result.scale_ppm:+.1f} ppm (sigma {result.scale_sigma_ppm:.1f}); a false alarm in "
+        f"{1.0 / result.alpha:.0f} checks at most.</p>"
+    )
+    return page(title, parts)
+
+
+def _camera_table(cameras: tuple[CameraCheck, ...]) -> str:
+    head = (
+        "camera",
+        "verdict",
+        "points",
+        "rms px",
+        "noise",
+        "load",
+        "moved px",
+        "at subject um",
+        "smallest turn urad",
+        "smallest shift um",
+        "smallest at subject um",
+    )
+    rows = []
+    for c in cameras:
+        sees = c.sensitivity
+        turn = max(sees.turn_urad[:2]) if sees else float("nan")
+        shift = max(sees.shift_um) if sees else float("nan")
+        hidden = 1e3 * sees.hidden_mm if sees else float("nan")
+        told = c.verdict.value + (f" ({c.reason})" if c.verdict is Kind.CANNOT_TELL else "")
+        numbers = (
+            c.rms_px,
+            c.noise_factor,
+            c.pose_statistic / c.pose_limit,
+            c.effect_px,
+            1e3 * c.effect_mm,
+            turn,
+            shift,
+            hidden,
+        )
+        rows.append((c.name, told, str(c.points), *(number(v) for v in numbers)))
+    return table(head, rows)
+
+
+def _carrier_table(result: CheckResult) -> str:
+    head = ("carrier", "verdict", "points", "rms px", "scale ppm", "sigma ppm", "worst target")
+    return table(
+        head,
+        (
+            (
+                c.name,
+                c.verdict.value,
+                str(c.points),
+                number(c.rms_px),
+                number(c.scale_ppm),
+                number(c.scale_sigma_ppm),
+                c.worst_target,
+            )
+            for c in result.carriers
+        ),
+    )
+
+
+def _length_table(result: CheckResult) -> str:
+    return table(
+        ("distance", "length mm", "error um", "sigma um", "error / sigma"),
+        (
+            (
+                f"{m.first} - {m.second}",
+                f"{m.length_mm:.3f}",
+                f"{m.error_um:+.1f}",
+                number(m.sigma_um),
+                f"{m.z:+.1f}",
+            )
+            for m in result.lengths
+        ),
+    )
+
+
+def _residuals(cameras: tuple[CameraCheck, ...], reference: Calibration) -> str:
+    sizes = {c.name: c.image_size_px for c in reference.cameras}
+    plots = (
+        f"<figure>{residual_plot(c.grid, sizes[c.name], c.name)}</figure>"
+        for c in cameras
+        if c.name in sizes and c.grid
+    )
+    return f'<div class="plots">{"".join(plots)}</div>'
+
+
+def calibration_page(calibration: Calibration, name: str = "", made_utc: str = "") -> str:
+    """A calibration: how good it is, camera by camera, and what to know of it."""
+    quality = calibration.quality
+    colour = Light.GREEN if quality.converged and not quality.warnings else Light.YELLOW
+    told = "Calibrated" if quality.converged else f"Not converged ({quality.stop.value})"
+    cross = quality.cross_validation
+    facts = [
+        ("image points, rms", f"{quality.rms_px:.3f} px"),
+        ("chi-square over degrees of freedom", f"{quality.chi2:.0f} / {quality.dof}"),
+        ("rejected as blunders", str(quality.rejected)),
+        ("size from", quality.scale),
+        ("datum", calibration.datum),
+        ("cross-validation", "-" if cross is None else f"{cross.ratio:.2f} ({cross.halves})"),
+    ]
+    rows = [
+        (
+            c.name,
+            str(c.points),
+            number(c.rms_px),
+            f"{c.coverage:.0%}",
+            number(c.sigma_factor),
+            number(c.focal_sigma_px),
+            number(c.centre_sigma_px),
+            number(1e3 * c.position_sigma_mm),
+            number(3600.0 * c.rotation_sigma_deg),
+        )
+        for c in quality.cameras
+    ]
+    head = (
+        "camera",
+        "points",
+        "rms px",
+        "coverage",
+        "noise",
+        "sigma f px",
+        "sigma centre px",
+        "sigma place um",
+        "sigma turn arcsec",
+    )
+    plots = "".join(
+        f"<figure>{residual_plot(c.grid, k.image_size_px, c.name)}</figure>"
+        for c, k in zip(quality.cameras, calibration.cameras, strict=True)
+        if c.grid
+    )
+    return page(
+        f"Calibration {name}".strip(),
+        [
+            f"<h1>{light(colour)} {escape(told)} {escape(name)}</h1><p>{escape(made_utc)}</p>",
+            *(finding(w, YELLOW) for w in quality.warnings),
+            table(("", ""), facts),
+            "<h2>Cameras</h2>",
+            table(head, rows),
+            "<h2>Residuals over the images</h2>",
+            f'<div class="plots">{plots}</div>',
+        ],
+    )
+
+
+def history_page(history: History) -> str:
+    """Checks over time: each camera's way towards its alarm, effects at the subject, scale."""
+    effects = [Series(c.name, tuple(1e3 * v for v in c.effect_mm)) for c in history.cameras]
+    rows = [
+        (time, colour, number(rms), f"{ppm:+.1f}", number(sigma))
+        for time, colour, rms, ppm, sigma in zip(
+            history.times,
+            history.lights,
+            history.rms_px,
+            history.scale_ppm,
+            history.scale_sigma_ppm,
+            strict=True,
+        )
+    ]
+    return page(
+        "Calibration checks over time",
+        [
+            f"<h1>Checks against {escape(history.reference or 'the reference')}</h1>",
+            history_svg(history),
+            chart(
+                history.times, effects, 0.0, "Effect at the subject", "effect at the subject, um"
+            ),
+            table(("time", "light", "rms px", "scale ppm", "sigma ppm"), rows),
+        ],
+    )
