@@ -14,6 +14,12 @@ PROVIDED = ("needs_browser", "needs_avr", "needs_aravis", "needs_genicam", "need
 
 _wrongly_skipped: list[str] = []
 
+# As the service's processes have it. Tests run side by side, and libraries that start a thread
+# for each core in each of them wait for one another: the quick tests take several times as long.
+# Read when the libraries are loaded, which is after this.
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(_name, "1")
+
 
 @pytest.hookimpl(hookwrapper=True)
 def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]):  # type: ignore[no-untyped-def]  # noqa: ANN201, ARG001
