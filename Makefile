@@ -1,6 +1,7 @@
 # make demo    set everything up and design a rig for the bundled head
 # make test    set everything up and pass the tests (the quick ones)
 # make check   lint, types, layers
+# make firmware    build the trigger box's firmware (needs gcc-avr, avr-libc)
 # make help    this list
 
 PYTHON ?= python3
@@ -8,8 +9,10 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 OUT ?= out/demo
+# Files are kept together: what a file sets up once is set up once.
+TESTS_SIDE_BY_SIDE := -n auto --dist loadfile
 
-.PHONY: help demo test test-all check format docs benchmarks clean
+.PHONY: help firmware demo test test-slow test-all check format docs benchmarks clean
 
 help:
 	@sed -n 's/^# make/make/p' Makefile
@@ -25,16 +28,21 @@ demo: $(STAMP)
 	$(BIN)/rigwright demo --out $(OUT) --force
 
 test: $(STAMP)
-	$(BIN)/python -m pytest -m 'not slow'
+	$(BIN)/python -m pytest $(TESTS_SIDE_BY_SIDE) -m 'not slow'
 
-test-all: $(STAMP)
-	$(BIN)/python -m pytest
+test-slow: $(STAMP)
+	$(BIN)/python -m pytest $(TESTS_SIDE_BY_SIDE) -m slow
+
+test-all: test test-slow
 
 check: $(STAMP)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+firmware:
+	$(MAKE) -C rig/firmware
 
 format: $(STAMP)
 	$(BIN)/ruff check --fix .
@@ -47,6 +55,10 @@ docs: $(STAMP)
 benchmarks: $(STAMP)
 	$(BIN)/python -m benchmarks.speed
 	$(BIN)/python -m benchmarks.faces
+	$(BIN)/python -m benchmarks.fires --fires 10000 --seed 1
+	$(BIN)/python -m benchmarks.crashes --times 200 --seed 1
+	$(BIN)/python -m benchmarks.rendering
+	$(BIN)/python -m benchmarks.firmware --out docs/trigger-timing.md
 
 clean:
 	rm -rf $(VENV) out build dist *.egg-info

@@ -13,8 +13,10 @@ from typing import Literal, Self
 from pydantic import Field
 
 from geometry.errors import InputError, TooLargeError
+from rig.catalogue import Catalogue
 from rig.sections.camera import CameraSection
 from rig.sections.limits import LimitsSection
+from rig.sections.parts import CATALOGUE
 from rig.sections.poses import FixedSection, StartSection
 from rig.sections.subject import ScanSection, SubjectSection
 from rig.spec import RigSpec
@@ -88,12 +90,17 @@ class RigFile(StrictModel):
         )
 
 
-def rig_from_mapping(data: Mapping[str, object], name: str = "rig") -> RigSpec:
-    """A rig from parsed TOML or JSON; ``name`` stands in front of every error."""
-    return validated(RigFile, data, name).to_spec()
+def rig_from_mapping(
+    data: Mapping[str, object], name: str = "rig", catalogue: Catalogue | None = None
+) -> RigSpec:
+    """A rig from parsed TOML or JSON; ``name`` stands in front of every error.
+
+    ``catalogue`` supplies the parts it names; without it, the one that comes with the program.
+    """
+    return validated(RigFile, data, name, {CATALOGUE: catalogue}).to_spec()
 
 
-def parse_rig(text: str, name: str = "rig") -> RigSpec:
+def parse_rig(text: str, name: str = "rig", catalogue: Catalogue | None = None) -> RigSpec:
     """A rig from the text of a rig file; raises a one-line :class:`InputError`."""
     try:
         data = tomllib.loads(text)
@@ -101,10 +108,10 @@ def parse_rig(text: str, name: str = "rig") -> RigSpec:
         raise InputError(
             "rig-not-toml", f"{name} is not a rig file: {error}", "write it as TOML"
         ) from error
-    return rig_from_mapping(data, name)
+    return rig_from_mapping(data, name, catalogue)
 
 
-def read_rig(path: Path) -> RigSpec:
+def read_rig(path: Path, catalogue: Catalogue | None = None) -> RigSpec:
     """A rig from a file; raises a one-line :class:`InputError`."""
     try:
         if path.stat().st_size > LARGEST_FILE_BYTES:
@@ -125,4 +132,4 @@ def read_rig(path: Path) -> RigSpec:
         raise InputError(
             "rig-not-toml", f"{path.name} is not a text file", "give the rig's TOML file"
         ) from error
-    return parse_rig(text, path.name)
+    return parse_rig(text, path.name, catalogue)

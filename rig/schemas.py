@@ -1,7 +1,8 @@
 """JSON schemas and key tables of the files, generated from the models that read them.
 
-``python -m rig.schemas DOCS`` writes ``rig.schema.json`` and ``design.schema.json`` to the
-folder DOCS and renews the tables between the marks in ``rig-file.md`` and ``design-file.md``.
+``python -m rig.schemas DOCS`` writes the schemas of rig files, design files, station files,
+sessions, captures and catalogues to the folder DOCS and renews the tables between the marks in
+``rig-file.md``, ``design-file.md``, ``station-file.md`` and ``catalogue.md``.
 """
 
 from __future__ import annotations
@@ -17,8 +18,11 @@ from typing import Any
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
+from rig.catalogue.model import CatalogueFile
 from rig.designmodel import DesignFile
 from rig.rigfile import RigFile
+from rig.session.records import CaptureRecord, SessionFile
+from rig.station.stationfile import StationFile
 from rig.strict import child_model, key_of
 
 BEGIN, END = "<!-- keys -->", "<!-- end of keys -->"
@@ -60,20 +64,22 @@ def keys(
         key, words = prefix + key_of(name, model), info.description or ""
         child = child_model(model, key_of(name, model))
         if child is None:
-            yield key, _default(info), words
+            yield key, _default(model, name), words
             continue
         key += "[]" if _is_list_of(info, child) else ""
         if child in told:
-            yield key, _default(info), f"{words} Keys as in {told[child]}."
+            yield key, _default(model, name), f"{words} Keys as in {told[child]}."
             continue
-        yield key, _default(info), words
+        yield key, _default(model, name), words
         told[child] = f"`{key}`"
         yield from keys(child, f"{key}.", told)
 
 
-def _default(info: FieldInfo) -> str:
+def _default(model: type[BaseModel], name: str) -> str:
+    info = model.model_fields[name]
     if info.is_required():
-        return "required"
+        stand_in = getattr(model, "stand_ins", {}).get(name)
+        return "required" if stand_in is None else f"required, or from `{stand_in}`"
     value = info.get_default(call_default_factory=True)
     if value is None or value == [] or isinstance(value, BaseModel):
         return ""
@@ -95,11 +101,18 @@ def with_key_table(text: str, model: type[BaseModel]) -> str:
 def documents(docs: Path) -> dict[Path, str]:
     """What each generated file in the folder ``docs`` should hold."""
     rig_file, design_file = docs / "rig-file.md", docs / "design-file.md"
+    station_file, parts_file = docs / "station-file.md", docs / "catalogue.md"
     return {
         docs / "rig.schema.json": schema_text(RigFile, "Rigwright rig file"),
         docs / "design.schema.json": schema_text(DesignFile, "Rigwright design file"),
+        docs / "station.schema.json": schema_text(StationFile, "Rigwright station file"),
+        docs / "session.schema.json": schema_text(SessionFile, "Rigwright session"),
+        docs / "capture.schema.json": schema_text(CaptureRecord, "Rigwright capture"),
+        docs / "catalogue.schema.json": schema_text(CatalogueFile, "Rigwright catalogue file"),
+        station_file: with_key_table(station_file.read_text(encoding="utf-8"), StationFile),
         rig_file: with_key_table(rig_file.read_text(encoding="utf-8"), RigFile),
         design_file: with_key_table(design_file.read_text(encoding="utf-8"), DesignFile),
+        parts_file: with_key_table(parts_file.read_text(encoding="utf-8"), CatalogueFile),
     }
 
 

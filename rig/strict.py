@@ -93,9 +93,14 @@ def one_line(error: ValidationError, model: type[BaseModel], source: str) -> Inp
     return InputError("value", f"{source}: {where}{given}{more}", message)
 
 
-def validated(model: type[ModelT], data: object, source: str) -> ModelT:
-    """``data`` as a ``model``; raises a one-line :class:`InputError` that names ``source``."""
+def validated(
+    model: type[ModelT], data: object, source: str, context: Mapping[str, object] | None = None
+) -> ModelT:
+    """``data`` as a ``model``; raises a one-line :class:`InputError` that names ``source``.
+
+    ``context`` reaches the model's own validators.
+    """
     try:
-        return model.model_validate(data)
+        return model.model_validate(data, context=None if context is None else dict(context))
     except ValidationError as error:
         raise one_line(error, model, source) from error

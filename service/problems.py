@@ -40,6 +40,7 @@ STATUS_OF_CODE: Mapping[str, int] = {
     "input/media-type": 415,
     "conflict/queue-full": 503,
     "internal/disk-full": 507,
+    "conflict/disk-full": 507,
     "internal/stopping": 503,
 }
 """Where HTTP has a more telling status than that of the kind."""

@@ -6,8 +6,8 @@ import os
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import Field, ValidationError
-from pydantic_settings import BaseSettings, SettingsConfigDict
+from pydantic import Field, ValidationError, field_validator
+from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
 from geometry.errors import InputError
 
@@ -34,6 +34,15 @@ class Settings(BaseSettings):
     data_dir: Annotated[Path, Field(description="Folder for everything the service keeps.")] = (
         Field(default_factory=default_data_folder)
     )
+    stations: Annotated[
+        tuple[Path, ...],
+        NoDecode,
+        Field(description="Station files of the rigs to run, separated as in PATH."),
+    ] = ()
+    sessions_dir: Annotated[
+        Path | None,
+        Field(description="Folder for the sessions; `sessions` in the data folder without it."),
+    ] = None
     max_upload_bytes: Annotated[int, Field(ge=1, description="Largest scan that is accepted.")] = (
         512 << 20
     )
@@ -51,6 +60,18 @@ class Settings(BaseSettings):
     scan_memory_limit_bytes: Annotated[
         int, Field(ge=1 << 29, description="Address space for reading an uploaded scan.")
     ] = 8 << 30
+
+    @field_validator("stations", mode="before")
+    @classmethod
+    def _separated(cls, given: object) -> object:
+        if isinstance(given, str):
+            return [part for part in given.split(os.pathsep) if part]
+        return given
+
+    @property
+    def sessions_folder(self) -> Path:
+        """Where sessions are photographed into."""
+        return self.sessions_dir or self.data_dir / "sessions"
 
 
 def read_settings(**given: object) -> Settings:

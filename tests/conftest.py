@@ -9,8 +9,8 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 ALLOW_NO_SKIP = "TESTS_ALLOW_NO_SKIP"
-PROVIDED = ("needs_browser",)
-"""Marks of tests whose needs .ci/packages.txt provides."""
+PROVIDED = ("needs_browser", "needs_avr", "needs_aravis", "needs_genicam", "needs_gphoto2")
+"""Marks of tests whose needs .ci/packages.txt or the development extras provide."""
 
 _wrongly_skipped: list[str] = []
 

@@ -77,6 +77,12 @@ class CameraCapabilities:
     exposure_start_delay_us: float | None = None
     settable: frozenset[str] = frozenset()
     """Names of the fields of :class:`CameraSettings` that it obeys."""
+    wait_overrun_s: float = 0.0
+    """How much longer than its timeout :meth:`CameraDevice.wait_frames` may take.
+
+    More than zero only where pictures are computed: the frames then state when they would have
+    come, and lateness is judged by that.
+    """
 
 
 @dataclass(frozen=True)
@@ -184,7 +190,7 @@ class CameraDevice(Protocol):
         ...
 
     def clock_samples(self, count: int) -> Sequence[ClockSample]:
-        """Readings of the camera's clock; empty unless timestamps are its own."""
+        """Readings of the camera's clock; empty unless timestamps are ``DEVICE`` or ``PTP``."""
         ...
 
     def health(self) -> CameraHealth:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Self
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 from annotated_types import Len
-from pydantic import Field
+from pydantic import ConfigDict, Field, ValidationInfo, model_validator
 
 from geometry.camera import Body, Camera
+from rig.sections.parts import CATALOGUE, with_parts
 from rig.strict import CameraName, Pair, StrictModel, Vector
 
 MICROMETRES = 1000.0
@@ -59,18 +61,60 @@ class BodySection(StrictModel):
         )
 
 
-class CameraSection(StrictModel):
-    """One kind of camera with its lens, used at every place of the rig."""
+def _need_not_all(schema: dict[str, Any]) -> None:
+    """In the JSON schema, what a model or a lens can supply is not required.
 
-    name: CameraName = Field(default="camera", description="What to call this kind of camera.")
+    That one of them must be there is left to the reader: an ``anyOf`` over so large an object
+    keeps programs that make test data from a schema busy for minutes.
+    """
+    schema["required"] = [key for key in schema["required"] if key not in CameraSection.stand_ins]
+
+
+class CameraSection(StrictModel):
+    """One kind of camera with its lens, used at every place of the rig.
+
+    ``model`` and ``lens`` name parts of the catalogue; keys that are given go before theirs.
+    """
+
+    model_config = ConfigDict(json_schema_extra=_need_not_all)
+    stand_ins: ClassVar[Mapping[str, str]] = {
+        "image_size_px": "model",
+        "pixel_pitch_um": "model",
+        "focal_length_mm": "lens",
+        "f_number": "lens",
+        "circle_of_confusion_um": "model",
+        "min_focus_mm": "lens",
+        "body": "model",
+    }
+    """Keys that need not be given when this other key is."""
+
+    model: str | None = Field(
+        default=None,
+        min_length=1,
+        max_length=100,
+        description="A camera of the catalogue, by id or name (`rigwright catalogue`).",
+    )
+    lens: str | None = Field(
+        default=None,
+        min_length=1,
+        max_length=100,
+        description="A lens of the catalogue that fits it.",
+    )
+    name: CameraName = Field(
+        default="camera",
+        description="What to call this kind of camera. With `model` and `lens`: both ids.",
+    )
     image_size_px: Annotated[list[Annotated[int, Field(ge=2, le=100_000)]], Len(2, 2)] = Field(
         description="Width and height of the image."
     )
     pixel_pitch_um: float = Field(gt=0.0, description="Distance of neighbouring pixels.")
-    focal_length_mm: float = Field(gt=0.0, description="Focal length (principal distance).")
+    # Far below any lens, yet its square is still a number: limits of sharpness divide by it.
+    focal_length_mm: float = Field(ge=0.01, description="Focal length (principal distance).")
     f_number: float = Field(gt=0.0, description="Aperture: 16 for f/16.")
     circle_of_confusion_um: float = Field(
-        gt=0.0, description="Largest blur disk on the sensor that still counts as sharp."
+        gt=0.0,
+        description="Largest blur disk on the sensor that still counts as sharp. With `model`: "
+        "two pixels.",
     )
     min_focus_mm: float = Field(
         gt=0.0, description="Nearest focus setting, from the projection centre."
@@ -89,6 +133,13 @@ class CameraSection(StrictModel):
         description="Principal point, pixel centres at integers. Without it: the image centre.",
     )
     body: BodySection = Field(description="The solid the camera occupies.")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _from_catalogue(cls, data: object, info: ValidationInfo) -> object:
+        if not isinstance(data, Mapping):
+            return data
+        return with_parts(data, (info.context or {}).get(CATALOGUE))
 
     def to_camera(self) -> Camera:
         """The camera as geometry sees it."""

@@ -89,12 +89,22 @@ class Edge:
 
 
 @dataclass(frozen=True)
+class WireLine:
+    """One line as it went over the wire between host and box."""
+
+    host_ns: int
+    sent: bool
+    text: str
+
+
+@dataclass(frozen=True)
 class FireReport:
     """What the box says of a capture: the first of three levels of evidence.
 
     ``clock_uncertainty_us`` is the half width within which ``at_host_ns`` of the edges is known
     (differences between edges do not suffer from it). ``edges`` is empty for a box without a log.
-    ``why`` says how the outcome was found where it was not plainly acknowledged.
+    ``why`` says how the outcome was found where it was not plainly acknowledged. ``wire`` is what
+    host and box said to each other from ARM on.
     """
 
     capture_id: str
@@ -105,6 +115,7 @@ class FireReport:
     clock_uncertainty_us: float = float("nan")
     acknowledged: bool = True
     why: str = ""
+    wire: tuple[WireLine, ...] = ()
 
     def rising_edges(self, output: int) -> tuple[Edge, ...]:
         """The rising edges of one output, shot by shot."""
@@ -196,6 +207,13 @@ class TriggerBox(Protocol):
 
     def abort(self) -> None:
         """All outputs low, now; allowed in every state."""
+        ...
+
+    def reset(self) -> None:
+        """Leave FAULT, with all outputs low; nothing but that where there is no fault.
+
+        Raises :class:`~geometry.errors.InterlockError` while the interlock is open.
+        """
         ...
 
     def subscribe(self, listener: Callable[[FireReport], None]) -> Callable[[], None]:

@@ -10,15 +10,25 @@ from anyio import to_thread
 from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 
-from service.api import designs, evaluations, root, scans
+from service.api import (
+    captures,
+    designs,
+    evaluations,
+    exports,
+    rigs,
+    rigtests,
+    root,
+    scans,
+    sessions,
+)
 from service.api.context import Service
 from service.api.errors import install_error_handlers
 from service.api.middleware import JsonLimit, RequestLog
 from service.api.models import Problem
 
 _DESCRIPTION = (
-    "Designs multi-camera rigs that photograph a face. Lengths are in millimetres, angles in "
-    "degrees, times in UTC. Errors are problem details (RFC 9457)."
+    "Designs and runs multi-camera rigs that photograph a face. Lengths are in millimetres, angles "
+    "in degrees, times in UTC. Errors are problem details (RFC 9457)."
 )
 
 
@@ -34,7 +44,11 @@ def make_app() -> FastAPI:
         docs_url=None,
         redoc_url=None,
     )
-    app.state.routers = [module.router for module in (root, scans, designs, evaluations)]
+    resources = (
+        *(root, scans, designs, exports, evaluations),
+        *(rigs, captures, rigtests, sessions),
+    )
+    app.state.routers = [module.router for module in resources]
     for router in app.state.routers:
         app.include_router(router)
     install_error_handlers(app)
@@ -54,7 +68,7 @@ def create_app(service: Service) -> FastAPI:
 @asynccontextmanager
 async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     service: Service = app.state.service
-    service.jobs.start()
+    service.start()
     yield
     await to_thread.run_sync(service.stop)
 

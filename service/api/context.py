@@ -11,9 +11,13 @@ from fastapi import Depends, Request
 
 from geometry.errors import InternalError
 from service.jobs.bell import Bell
+from service.jobs.cancels import Cancels
 from service.jobs.engine import Engine, JobKind
 from service.jobs.manager import JobManager
 from service.jobs.process import ProcessEngine
+from service.rigs.desk import Books
+from service.rigs.desks import RigDesks, read_stations
+from service.rigs.orders import RIG_KINDS
 from service.settings import Settings
 from service.store import Store
 
@@ -27,12 +31,23 @@ class Service:
         self, settings: Settings, kinds: Mapping[str, JobKind], engine: Engine | None = None
     ) -> None:
         self.settings = settings
-        self.store = Store(settings.data_dir)
+        stations = read_stations(settings.stations)
+        self.store = Store(settings.data_dir, settled_elsewhere=RIG_KINDS)
         self.engine = engine or ProcessEngine(settings.cancel_grace_s)
         self.bell = Bell()
-        self.jobs = JobManager(self.store, self.engine, kinds, self.bell, settings.jobs_at_once)
+        self.cancels = Cancels(self.store, self.bell)
+        self.jobs = JobManager(
+            self.store, self.engine, kinds, self.bell, self.cancels, settings.jobs_at_once
+        )
+        books = Books(self.store, self.bell, self.cancels)
+        self.rigs = RigDesks(stations, settings.sessions_folder, books)
         self.stopping = threading.Event()
         self.imports = CapacityLimiter(_IMPORTS_AT_ONCE)
+
+    def start(self) -> None:
+        """Begin with the jobs that wait, and open the rigs."""
+        self.jobs.start()
+        self.rigs.start()
 
     def announce_stop(self) -> None:
         """End what would keep connections open: event streams and imports of scans."""
@@ -43,6 +58,7 @@ class Service:
         """Stop all work; jobs that run are marked interrupted."""
         self.announce_stop()
         self.jobs.stop()
+        self.rigs.stop()
 
     def close(self) -> None:
         """Let go of the store."""

@@ -23,21 +23,29 @@ _TERMINAL = ("completed", "failed", "cancelled", "interrupted")
 class JobResource:
     """The routes of one kind of job under ``/v1/<plural>``.
 
-    ``shortcuts`` give files a path of their own: ``{"report": "report.html"}``.
+    ``with_files`` says whether such jobs leave files of their own.
     """
 
     def __init__(
-        self, kind: str, plural: str, model: type[BaseModel], page: type[BaseModel]
+        self,
+        kind: str,
+        plural: str,
+        model: type[BaseModel],
+        page: type[BaseModel],
+        *,
+        with_files: bool = True,
     ) -> None:
         self.kind = kind
         self.path = f"/v1/{plural}"
         self._model = model
         self._page = page
+        self._with_files = with_files
 
     def document(self, job: JobRecord) -> JSON:
         """A job as it goes over HTTP."""
         own = f"{self.path}/{job.id}"
-        links = {name: f"{own}/{name}" for name in ("events", "cancel", "files")}
+        words = ("events", "cancel", "files") if self._with_files else ("events", "cancel")
+        links = {name: f"{own}/{name}" for name in words}
         return {
             "id": job.id,
             "kind": job.kind,
@@ -58,7 +66,8 @@ class JobResource:
         self._add_reading(router)
         self._add_events(router)
         self._add_changing(router)
-        self._add_files(router)
+        if self._with_files:
+            self._add_files(router)
 
     def _add_reading(self, router: APIRouter) -> None:
         @router.get(self.path, response_model=self._page, responses=problems(422))
@@ -107,7 +116,7 @@ class JobResource:
         )
         def cancel_job(service: ServiceDep, job_id: str) -> JSON:
             """Ask a job to stop. Asking again changes nothing; once it has ended: 409."""
-            return self.document(service.jobs.cancel(job_id, self.kind))
+            return self.document(service.cancels.cancel(job_id, self.kind))
 
         @router.delete(self.path + "/{job_id}", status_code=204, responses=problems(404, 409))
         def remove_job(service: ServiceDep, job_id: str) -> None:

@@ -135,7 +135,9 @@ _MEANING = {
     409: "Not possible in the present state.",
     413: "What was sent is too large.",
     415: "This media type is not accepted.",
+    423: "The interlock is open: nothing may fire.",
     422: "What was sent cannot be used; the detail says what to change.",
-    503: "Too much work is waiting, or the service is stopping; try again later.",
+    503: "A device is missing, too much work is waiting, or the service is stopping; try again "
+    "later.",
     507: "The disk is full.",
 }

@@ -10,9 +10,11 @@ from typing import Annotated
 
 import typer
 
+from service.cli import partcommands, rigcommands
+
 app = typer.Typer(
     name="rigwright",
-    help="Designs multi-camera rigs that photograph a face from all sides at one instant.",
+    help="Designs and runs multi-camera rigs that photograph a face from all sides at one instant.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
@@ -164,14 +166,26 @@ def serve(
             metavar="DIR", help="Folder for everything the service keeps.", show_default=False
         ),
     ] = None,
+    station: Annotated[
+        list[Path] | None,
+        typer.Option(
+            metavar="STATION.toml",
+            help="A rig to run; may be given several times.",
+            show_default=False,
+        ),
+    ] = None,
 ) -> None:
-    """Offer designs over HTTP, under /v1. The guide is docs/api.md.
+    """Offer designs, and rigs that stand, over HTTP under /v1. The guide is docs/api.md.
 
-    Example:  rigwright serve --port 8000 --data rigwright-data
+    Example:  rigwright serve --port 8000 --data rigwright-data --station station.toml
     """
     from service.cli.serving import run_serve_command
 
-    run_serve_command(host, port, data)
+    run_serve_command(host, port, data, station)
+
+
+partcommands.add_to(app)
+rigcommands.add_to(app)
 
 
 def main() -> None:

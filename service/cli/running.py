@@ -66,7 +66,7 @@ def run_task(
         _require_file(path)
     whole = {role: path.resolve() for role, path in inputs.items()}
     task = Task(JobKind("command", entry), request, folder.resolve(), whole)
-    with _cancel_on_signal() as cancel, show_progress() as report:
+    with cancel_on_signal() as cancel, show_progress() as report:
         return ProcessEngine().run(task, report, cancel)
 
 
@@ -80,7 +80,8 @@ def _require_file(path: Path) -> None:
 
 
 @contextmanager
-def _cancel_on_signal() -> Iterator[threading.Event]:
+def cancel_on_signal() -> Iterator[threading.Event]:
+    """An event that Ctrl-C or TERM sets, instead of ending the program."""
     cancel = threading.Event()
 
     def ask(_number: int, _frame: FrameType | None) -> None:

@@ -10,10 +10,12 @@ from service.logs import log, set_up_logging
 from service.settings import read_settings
 
 
-def run_serve_command(host: str | None, port: int | None, data: Path | None) -> None:
+def run_serve_command(
+    host: str | None, port: int | None, data: Path | None, stations: list[Path] | None
+) -> None:
     """Serve until asked to stop."""
     with one_line_errors():
-        settings = read_settings(host=host, port=port, data_dir=data)
+        settings = read_settings(host=host, port=port, data_dir=data, stations=stations)
         # After the settings, so that a mistake in them is told at once.
         from service.api.app import create_app
         from service.api.context import Service

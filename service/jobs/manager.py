@@ -20,6 +20,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from geometry.errors import CancelledError, InternalError, RigwrightError
 from service import logs
 from service.jobs.bell import Bell
+from service.jobs.cancels import Cancels
 from service.jobs.engine import Engine, JobKind, Task
 from service.store import Store, interrupted
 from service.store.jobrecords import JobRecord
@@ -35,7 +36,13 @@ class JobManager:
     """Drives ``at_once`` jobs at a time."""
 
     def __init__(
-        self, store: Store, engine: Engine, kinds: Mapping[str, JobKind], bell: Bell, at_once: int
+        self,
+        store: Store,
+        engine: Engine,
+        kinds: Mapping[str, JobKind],
+        bell: Bell,
+        cancels: Cancels,
+        at_once: int,
     ) -> None:
         self._store = store
         self._engine = engine
@@ -43,7 +50,7 @@ class JobManager:
         self._bell = bell
         self._news = threading.Condition()
         self._stopping = False
-        self._cancels: dict[str, threading.Event] = {}
+        self._cancels = cancels
         self._drivers = [
             threading.Thread(target=self._drive, name=f"job-driver-{n}", daemon=True)
             for n in range(at_once)
@@ -59,23 +66,12 @@ class JobManager:
         with self._news:
             self._news.notify_all()
 
-    def cancel(self, job_id: str, kind: str) -> JobRecord:
-        """Ask a job to stop. Raises :class:`~geometry.errors.ConflictError` if it has ended."""
-        record = self._store.jobs.request_cancel(job_id, kind)
-        with self._news:
-            cancel = self._cancels.get(job_id)
-        if cancel is not None:
-            cancel.set()
-        self._bell.ring(job_id)
-        return record
-
     def stop(self) -> None:
         """Stop what runs and mark it interrupted. What is pending begins at the next start."""
         with self._news:
             self._stopping = True
-            for cancel in self._cancels.values():
-                cancel.set()
             self._news.notify_all()
+        self._cancels.stop_all()
         for driver in self._drivers:
             driver.join()
 
@@ -100,7 +96,6 @@ class JobManager:
                     self._news.wait(_RETRY_S)
                     continue
                 if job is not None:
-                    self._cancels[job.id] = threading.Event()
                     return job
                 self._news.wait()
         return None
@@ -108,19 +103,16 @@ class JobManager:
     def _run(self, job: JobRecord) -> None:
         self._bell.ring(job.id)
         logs.log.info("job started", extra={"fields": {"kind": job.kind}})
-        cancel = self._cancels[job.id]
-        if self._store.jobs.get(job.id).cancel_requested:
-            # Asked for between the claim and the moment the event above could be found.
-            cancel.set()
         folder = self._store.work_folder(job.id)
         try:
-            self._keep(job, self._work(job, folder, cancel), folder / "files")
+            with self._cancels.running(job.id) as cancel:
+                if self._stopping:
+                    cancel.set()
+                self._keep(job, self._work(job, folder, cancel), folder / "files")
         except RigwrightError as error:
-            self._end_without_result(job, error)
+            end_without_result(self._store, job.id, error)
         finally:
             shutil.rmtree(folder, ignore_errors=True)
-            with self._news:
-                del self._cancels[job.id]
             self._bell.ring(job.id)
 
     def _give_up(self, job: JobRecord) -> None:
@@ -168,12 +160,14 @@ class JobManager:
         self._store.jobs.complete(job.id, result, files)
         logs.log.info("job completed")
 
-    def _end_without_result(self, job: JobRecord, error: RigwrightError) -> None:
-        if not isinstance(error, CancelledError):
-            status, fields = JobStatus.FAILED, error_fields(error)
-        elif self._store.jobs.get(job.id).cancel_requested:
-            status, fields = JobStatus.CANCELLED, None
-        else:
-            status, fields = JobStatus.INTERRUPTED, error_fields(interrupted())
-        self._store.jobs.end(job.id, status, fields)
-        logs.log.info("job ended", extra={"fields": {"status": status, "problem": fields}})
+
+def end_without_result(store: Store, job_id: str, error: RigwrightError) -> None:
+    """Write down how a job ended that has no result: failed, cancelled, or interrupted."""
+    if not isinstance(error, CancelledError):
+        status, fields = JobStatus.FAILED, error_fields(error)
+    elif store.jobs.get(job_id).cancel_requested:
+        status, fields = JobStatus.CANCELLED, None
+    else:
+        status, fields = JobStatus.INTERRUPTED, error_fields(interrupted())
+    store.jobs.end(job_id, status, fields)
+    logs.log.info("job ended", extra={"fields": {"status": status, "problem": fields}})

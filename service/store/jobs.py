@@ -128,6 +128,12 @@ class Jobs:
         """One job, of the given kind. Raises :class:`NotFoundError`."""
         return self._database.read(lambda connection: one_job(connection, job_id, kind))
 
+    def find(self, job_id: str) -> JobRecord | None:
+        """One job of whatever kind, None when there is none."""
+        query = select(jobs).where(jobs.c.id == job_id)
+        row = self._database.read(lambda connection: connection.execute(query).mappings().first())
+        return None if row is None else record_of(row)
+
     def page(self, kind: str, limit: int, before: int | None) -> list[JobRecord]:
         """Newest first; ``before`` is the ``seq`` at which the page before ended."""
         query = select(jobs).where(jobs.c.kind == kind).order_by(jobs.c.seq.desc()).limit(limit)

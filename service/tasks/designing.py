@@ -14,6 +14,7 @@ from rig.designfile import design_from_mapping, read_design
 from rig.examples import example_text
 from rig.rigfile import parse_rig, read_rig, rig_from_mapping
 from rig.spec import RigSpec
+from rig.station.examples import example_station_text
 from service import work
 from solver.progress import CancelToken, Progress, ProgressCallback
 
@@ -52,6 +53,7 @@ def demo(
     summary = _designed(named, scan, spec, folder, report, cancel)
     scan.replace(folder / scan.name)
     (folder / "face.toml").write_text(rig, encoding="utf-8")
+    (folder / "station.toml").write_text(example_station_text(), encoding="utf-8")
     return summary
 
 

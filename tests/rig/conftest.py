@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from memorybench import BenchMaker
 
 from geometry.camera import RigCamera
 from geometry.frames import Pose
@@ -28,6 +30,14 @@ REPO = Path(__file__).resolve().parents[2]
 @pytest.fixture(scope="session")
 def repo() -> Path:
     return REPO
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> Iterator[BenchMaker]:
+    """Rigs of memory: open, with a session, closed again after the test."""
+    maker = BenchMaker(tmp_path)
+    yield maker
+    maker.close()
 
 
 @pytest.fixture(scope="session")

@@ -9,11 +9,13 @@ from pathlib import Path
 import jsonschema
 import pytest
 
+from rig.catalogue.model import CatalogueFile
 from rig.designfile import design_document
 from rig.designmodel import DesignFile
 from rig.examples import example_rig, example_text
 from rig.rigfile import RigFile, parse_rig
 from rig.schemas import documents, keys, main
+from rig.station.stationfile import StationFile, parse_station
 from solver.result import Design
 
 
@@ -23,21 +25,27 @@ def test_generated_documents_are_up_to_date(repo: Path) -> None:
 
 
 def test_the_command_writes_them(repo: Path, tmp_path: Path) -> None:
-    for name in ("rig-file.md", "design-file.md"):
+    for name in ("rig-file.md", "design-file.md", "station-file.md", "catalogue.md"):
         text = (repo / "docs" / name).read_text(encoding="utf-8")
         (tmp_path / name).write_text(text.replace("| `seed` |", "| `sead` |"), encoding="utf-8")
     main(tmp_path)
-    for name in ("rig-file.md", "design-file.md", "rig.schema.json", "design.schema.json"):
+    for name in (path.name for path in documents(tmp_path)):
         assert (tmp_path / name).read_text() == (repo / "docs" / name).read_text()
 
 
 @pytest.mark.parametrize(
-    ("document", "model"), [("rig-file.md", RigFile), ("design-file.md", DesignFile)]
+    ("document", "model"),
+    [
+        ("rig-file.md", RigFile),
+        ("design-file.md", DesignFile),
+        ("station-file.md", StationFile),
+        ("catalogue.md", CatalogueFile),
+    ],
 )
 def test_every_key_is_documented(repo: Path, document: str, model: type) -> None:
     text = (repo / "docs" / document).read_text(encoding="utf-8")
     told = list(keys(model))
-    assert len(told) > 60
+    assert len(told) > 50
     for key, _, words in told:
         assert f"| `{key}` |" in text
         assert words.endswith("."), f"{key} has no sentence"
@@ -66,9 +74,26 @@ def test_the_rig_file_in_the_document_is_a_rig_file(repo: Path) -> None:
     text = (repo / "docs/rig-file.md").read_text(encoding="utf-8")
     first = text.split("```toml\n")[1].split("```")[0]
     assert parse_rig(first).count == 7
-    zones = text.split("```toml\n")[2].split("```")[0]
+    parts = text.split("```toml\n")[2].split("```")[0]
+    assert parse_rig(f'schema = "rigwright.rig/1"\n{parts}').camera.f_number == 16.0
+    zones = text.split("```toml\n")[3].split("```")[0]
     # The zones of the document, put into the example in place of its own.
     before, _, after = example_text("face").partition("[limits.zones]")
     rest = after.partition("[limits.motion]")[2]
     read = parse_rig(f"{before}{zones}\n[limits.motion]{rest}").limits.zones
     assert (len(read.forbidden), len(read.allowed)) == (1, 1)
+
+
+def test_the_station_file_in_the_document_is_a_station_file(repo: Path) -> None:
+    text = (repo / "docs/station-file.md").read_text(encoding="utf-8")
+    station = parse_station(text.split("```toml\n")[1].split("```")[0])
+    assert len(station.cameras) == 2 and station.trigger is not None
+
+
+def test_the_example_station_follows_its_schema(repo: Path) -> None:
+    schema = json.loads((repo / "docs/station.schema.json").read_text())
+    jsonschema.Draft202012Validator.check_schema(schema)
+    data = tomllib.loads((repo / "examples/station/station.toml").read_text())
+    jsonschema.validate(data, schema)
+    with pytest.raises(jsonschema.ValidationError, match="camra"):
+        jsonschema.validate({**data, "camra": []}, schema)

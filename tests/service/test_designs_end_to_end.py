@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import copy
+import io
 import json
 import os
 import signal
 import subprocess
 import time
 import tomllib
+import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -126,6 +128,19 @@ class TestOverHttp:
         assert scene.headers["content-type"] == "model/gltf-binary"
         assert scene.content[:4] == b"glTF"
 
+    def test_its_cameras_go_to_other_programs(self, http: TestClient, completed: JSON) -> None:
+        own = completed["links"]["self"]
+        formats = http.get(f"{own}/exports").json()["items"]
+        assert {"colmap-text", "metashape-xml", "opencv"} <= {form["name"] for form in formats}
+        answer = http.get(f"{own}/exports/colmap-text")
+        assert answer.headers["content-type"] == "application/zip"
+        with zipfile.ZipFile(io.BytesIO(answer.content)) as archive:
+            cameras = archive.read("cameras.txt").decode()
+        placed = http.get(f"{own}/design").json()["cameras"]
+        lines = [line for line in cameras.splitlines() if line and not line.startswith("#")]
+        assert len(lines) == len(placed)
+        assert http.get(f"{own}/exports/colmpa").status_code == 404
+
     def test_progress_was_told_and_never_fell(self, http: TestClient, completed: JSON) -> None:
         answer = http.get(f"{completed['links']['self']}/events")
         data = [
@@ -157,6 +172,7 @@ class TestOverHttp:
         job = finished(http, http.post("/v1/designs", json=asked).headers["Location"])
         assert (job["result"]["cameras"], job["result"]["seed"]) == (3, 11)
 
+    @pytest.mark.slow
     def test_limits_in_conflict_complete_with_the_nearest_design(
         self, http: TestClient, scan_id: str, small_rig: JSON
     ) -> None:
@@ -367,7 +383,7 @@ class TestOnTheCommandLine:
         done = self.run("demo", "--out", tmp_path / "demo", "--json")
         assert done.returncode == 0, done.stderr
         names = {path.name for path in (tmp_path / "demo").iterdir()}
-        assert names == {*FILE_NAMES, "head.ply", "face.toml"}
+        assert names == {*FILE_NAMES, "head.ply", "face.toml", "station.toml"}
         again = self.run(
             "evaluate",
             tmp_path / "demo/design.json",

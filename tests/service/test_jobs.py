@@ -14,6 +14,7 @@ from service_helpers import HERE, ROOT, alive, ended, files_under, wait_for
 
 from geometry.errors import CancelledError, ConflictError, InputError, InternalError, TooLargeError
 from service.jobs.bell import Bell
+from service.jobs.cancels import Cancels
 from service.jobs.engine import Task
 from service.jobs.manager import JobManager
 from service.jobs.process import ProcessEngine
@@ -132,9 +133,18 @@ class TestProcessEngine:
         wait_for(lambda: not Path(f"/proc/{children[0]}").exists(), 3.0)
 
 
+def manager_of(store: Store, cancels: Cancels, at_once: int) -> JobManager:
+    return JobManager(store, ENGINE, counting_job.KINDS, Bell(), cancels, at_once)
+
+
 @pytest.fixture
-def manager(store: Store) -> Iterator[JobManager]:
-    made = JobManager(store, ENGINE, counting_job.KINDS, Bell(), at_once=2)
+def cancels(store: Store) -> Cancels:
+    return Cancels(store, Bell())
+
+
+@pytest.fixture
+def manager(store: Store, cancels: Cancels) -> Iterator[JobManager]:
+    made = manager_of(store, cancels, at_once=2)
     made.start()
     yield made
     made.stop()
@@ -180,29 +190,35 @@ class TestJobManager:
             )
         assert ended(store, ask(store, manager, "count", to=1)).status is JobStatus.COMPLETED
 
-    def test_cancel_a_running_and_a_pending_job(self, store: Store, manager: JobManager) -> None:
+    def test_cancel_a_running_and_a_pending_job(
+        self, store: Store, manager: JobManager, cancels: Cancels
+    ) -> None:
         running = [ask(store, manager, "count", to=10_000) for _ in range(2)]
         wait_for(lambda: store.jobs.counts().get(JobStatus.RUNNING) == 2)
         pending = ask(store, manager, "count", to=1)
-        assert manager.cancel(pending, "count").status is JobStatus.CANCELLED
+        assert cancels.cancel(pending, "count").status is JobStatus.CANCELLED
         for job in running:
             wait_for(lambda job=job: store.jobs.get(job).progress)
-            assert manager.cancel(job, "count").cancel_requested
+            assert cancels.cancel(job, "count").cancel_requested
             began = time.monotonic()
             assert ended(store, job).status is JobStatus.CANCELLED
             assert time.monotonic() - began < 1.0
             with pytest.raises(ConflictError) as caught:
-                manager.cancel(job, "count")
+                cancels.cancel(job, "count")
             assert caught.value.code == "conflict/job-ended"
 
-    def test_cancel_before_the_work_has_begun(self, store: Store, manager: JobManager) -> None:
+    def test_cancel_before_the_work_has_begun(
+        self, store: Store, manager: JobManager, cancels: Cancels
+    ) -> None:
         for _ in range(5):
             job = ask(store, manager, "count", to=10_000)
-            manager.cancel(job, "count")
+            cancels.cancel(job, "count")
             assert ended(store, job).status is JobStatus.CANCELLED
 
-    def test_stopping_interrupts_what_runs_and_leaves_what_waits(self, store: Store) -> None:
-        manager = JobManager(store, ENGINE, counting_job.KINDS, Bell(), at_once=1)
+    def test_stopping_interrupts_what_runs_and_leaves_what_waits(
+        self, store: Store, cancels: Cancels
+    ) -> None:
+        manager = manager_of(store, cancels, at_once=1)
         manager.start()
         running = ask(store, manager, "count", to=10_000)
         wait_for(lambda: store.jobs.get(running).progress)
@@ -210,7 +226,7 @@ class TestJobManager:
         manager.stop()
         assert store.jobs.get(running).status is JobStatus.INTERRUPTED
         assert store.jobs.get(waiting).status is JobStatus.PENDING
-        again = JobManager(store, ENGINE, counting_job.KINDS, Bell(), at_once=1)
+        again = manager_of(store, cancels, at_once=1)
         again.start()
         assert ended(store, waiting).status is JobStatus.COMPLETED
         again.stop()

@@ -21,6 +21,7 @@ from service.problems import (
     problem_document,
     status_of,
 )
+from service.rigs.orders import RIG_KINDS
 from service.settings import PREFIX, Settings
 from service.store.blobs import Staging
 from service.store.jobs import Jobs
@@ -160,11 +161,11 @@ def test_log_lines_are_json_with_the_job() -> None:
 GUIDE = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
 
 
-def codes_in_the_code() -> set[str]:
-    """The type of every error that ``service`` itself raises."""
+def codes_in_the_code(package: str = "service") -> set[str]:
+    """The type of every error that a package itself raises."""
     kinds = {kind.__name__: kind.kind for kind in all_errors()}
     found = set()
-    for path in (ROOT / "service").rglob("*.py"):
+    for path in (ROOT / package).rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if not (isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.args):
                 continue
@@ -186,8 +187,9 @@ def test_the_guide_lists_every_error() -> None:
 def test_the_guide_lists_no_error_that_cannot_come() -> None:
     listed = set(re.findall(r"`((?:" + "|".join(KINDS) + r")/[a-z-]+)`", GUIDE))
     framework = {f"{kind}/{detail}" for kind, detail, _ in HTTP_ERRORS.values()}
-    of_job_kinds = {f"not-found/{kind}" for kind in JOB_KINDS}
-    assert listed - codes_in_the_code() - framework - of_job_kinds == set()
+    of_job_kinds = {f"not-found/{kind}" for kind in (*JOB_KINDS, *RIG_KINDS)}
+    of_rigs = codes_in_the_code("rig")
+    assert listed - codes_in_the_code() - of_rigs - framework - of_job_kinds == set()
 
 
 def test_the_guide_lists_every_setting_and_path() -> None:
@@ -195,5 +197,5 @@ def test_the_guide_lists_every_setting_and_path() -> None:
         assert f"`{PREFIX}{name.upper()}`" in GUIDE
     for path in make_app().openapi()["paths"]:
         shown = path.replace("{scan_id}", "{id}").replace("{job_id}", "{id}")
-        if not shown.startswith("/v1/evaluations/"):
+        if not shown.startswith(("/v1/evaluations/", "/v1/captures/{id}/", "/v1/rig-tests/{id}/")):
             assert shown in GUIDE or shown.removeprefix("/v1/designs/{id}") in GUIDE, shown

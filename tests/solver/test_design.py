@@ -175,6 +175,7 @@ def test_design_holds_for_the_head_anywhere_in_its_box() -> None:
             assert (pixels < np.array(camera.camera.image_size_px) - 19.0).all()
 
 
+@pytest.mark.slow
 def test_spacing_and_symmetry_of_eqs_13_to_15() -> None:
     limits = rigs.face_limits(
         spacing=Spacing(450.0, 5.0),

@@ -1,0 +1,59 @@
+"""nerfstudio's ``transforms.json``.
+
+Camera to world, metres, camera axes x right, y up, looking along -z; world Z up, which is the
+rig's own. The corner of the image is (0, 0): nerfstudio shoots its rays through pixel centres
+at 0.5. Each frame carries its own intrinsics.
+"""
+
+from __future__ import annotations
+
+import json
+
+from geometry.camera import RigCamera
+from geometry.exchange.base import Cameras, ExportOptions, Files, Format, image_name
+from geometry.exchange.conventions import (
+    METRES_PER_MM,
+    corner_principal_point_px,
+    graphics_camera_to_rig,
+)
+
+IMAGES = "images"
+
+
+def _frame(rig_camera: RigCamera, options: ExportOptions) -> dict[str, object]:
+    camera = rig_camera.camera
+    k1, k2, p1, p2, k3 = (float(v) for v in camera.distortion)
+    cx, cy = corner_principal_point_px(camera)
+    return {
+        "file_path": f"{IMAGES}/{image_name(rig_camera, options)}",
+        "fl_x": camera.focal_length_px,
+        "fl_y": camera.focal_length_px,
+        "cx": float(cx),
+        "cy": float(cy),
+        "w": camera.image_size_px[0],
+        "h": camera.image_size_px[1],
+        "k1": k1,
+        "k2": k2,
+        "k3": k3,
+        "p1": p1,
+        "p2": p2,
+        "transform_matrix": graphics_camera_to_rig(rig_camera.pose, METRES_PER_MM).tolist(),
+    }
+
+
+def write(cameras: Cameras, options: ExportOptions) -> Files:
+    """``transforms.json``."""
+    document = {
+        "camera_model": "OPENCV",
+        "frames": [_frame(camera, options) for camera in cameras],
+    }
+    return {"transforms.json": (json.dumps(document, indent=1) + "\n").encode()}
+
+
+FORMAT = Format(
+    "nerfstudio",
+    "nerfstudio",
+    "transforms.json with the intrinsics of each frame",
+    ("transforms.json",),
+    write,
+)

@@ -1,0 +1,89 @@
+"""All exports by name, and how to write one to a folder."""
+
+from __future__ import annotations
+
+import difflib
+import secrets
+import shutil
+from pathlib import Path
+
+from geometry.errors import ConflictError, InputError, NotFoundError
+from geometry.exchange import (
+    blender,
+    colmap,
+    gltf,
+    meshroom,
+    metashape,
+    nerfstudio,
+    opencv_yaml,
+    realityscan,
+    usd,
+)
+from geometry.exchange.base import Cameras, ExportOptions, Files, Format, check_cameras
+
+FORMATS: dict[str, Format] = {
+    form.name: form
+    for form in (
+        colmap.TEXT,
+        colmap.BINARY,
+        metashape.XML,
+        metashape.CSV,
+        realityscan.FORMAT,
+        nerfstudio.FORMAT,
+        meshroom.FORMAT,
+        opencv_yaml.FORMAT,
+        blender.FORMAT,
+        gltf.FORMAT,
+        usd.FORMAT,
+    )
+}
+"""Exports by the name a user chooses them with."""
+
+
+def find_format(name: str) -> Format:
+    """The export ``name``; raises :class:`NotFoundError` with the nearest name."""
+    if name in FORMATS:
+        return FORMATS[name]
+    close = difflib.get_close_matches(name.lower(), FORMATS, 1, 0.4)
+    remedy = f"did you mean {close[0]}?" if close else f"choose one of {', '.join(FORMATS)}"
+    raise NotFoundError("export-format", f"there is no export format {name!r}", remedy)
+
+
+def export_files(name: str, cameras: Cameras, options: ExportOptions | None = None) -> Files:
+    """The files of the export ``name`` by relative name; nothing is written.
+
+    Raises :class:`NotFoundError` for an unknown format and :class:`InputError` for cameras
+    that it cannot tell apart.
+    """
+    form = find_format(name)
+    check_cameras(cameras)
+    return form.write(cameras, options or ExportOptions())
+
+
+def write_export(
+    out: Path, name: str, cameras: Cameras, options: ExportOptions | None = None
+) -> dict[str, Path]:
+    """Write an export to the new or empty folder ``out``; returns the paths by file name.
+
+    The files are written beside it and renamed, so that ``out`` never holds half an export.
+    """
+    files = export_files(name, cameras, options)
+    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+        raise ConflictError(
+            "out-not-empty", f"{out} is there already", "choose an empty or new folder"
+        )
+    half = out.parent / f".{out.name}.{secrets.token_hex(4)}.part"
+    try:
+        half.mkdir(parents=True)
+        for file_name, content in files.items():
+            (half / file_name).write_bytes(content)
+        half.replace(out)
+    except OSError as error:
+        raise InputError(
+            "out-unwritable",
+            f"cannot write to {out} ({(error.strerror or 'unwritable').lower()})",
+            "choose another --out folder",
+        ) from error
+    finally:
+        shutil.rmtree(half, ignore_errors=True)
+    return {file_name: out / file_name for file_name in files}

@@ -1,0 +1,1 @@
+"""The catalogue's data files: one TOML file per kind of part."""

@@ -1,0 +1,193 @@
+"""When an exposure was, from the share of it for which each bit of a Gray-coded counter was 1.
+
+Times are in ticks of the counter. Bit k of the Gray code of n is 1 while ``n mod 2**(k+2)`` is in
+``[2**k, 3 * 2**k)``, so its integral over any interval has a closed form, and the shares of all
+bits are known functions of the interval's middle and length. Those two are fitted by least
+squares: the slow bits say roughly when, bits that change within the interval say exactly.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from geometry.arrays import Floats
+
+_ZOOMS = 11
+_SIDE = 13
+_KEPT = 3
+_ZOOMED = 10
+_NOMINAL_SIGMA = 0.1
+"""An exposure time that a camera states is believed to this share of itself."""
+
+_SHORTEST_TICKS = 0.02
+_SHORT_TICKS = 4.0
+"""Below this length the slopes of the shares say too little, and the whole likelihood is taken."""
+
+
+@dataclass(frozen=True)
+class Interval:
+    """An exposure in ticks, with standard deviations; ``residual`` is the rms misfit of shares."""
+
+    middle_ticks: float
+    length_ticks: float
+    middle_sigma_ticks: float
+    length_sigma_ticks: float
+    residual: float
+
+
+def lit_shares(middle_ticks: Floats, length_ticks: Floats, bits: int) -> Floats:
+    """Share of each exposure for which each bit was 1: (..., bits) for arrays (...)."""
+    start = np.asarray(middle_ticks - 0.5 * length_ticks)[..., None]
+    end = np.asarray(middle_ticks + 0.5 * length_ticks)[..., None]
+    return np.asarray((_lit_before(end, bits) - _lit_before(start, bits)) / (end - start))
+
+
+def _lit_before(ticks: Floats, bits: int) -> Floats:
+    """Ticks for which each bit was 1 between 0 and ``ticks`` (..., 1): (..., bits)."""
+    quarter = 2.0 ** np.arange(bits)
+    # The top bit has no bit above it to turn it off half way: it is 1 for the upper half.
+    rise = quarter.copy()
+    fall = 3.0 * quarter
+    rise[-1] = quarter[-1]
+    fall[-1] = 2.0 * quarter[-1]
+    period = 4.0 * quarter
+    period[-1] = 2.0 * quarter[-1]
+    turns = np.floor(ticks / period)
+    rest = ticks - turns * period
+    return np.asarray(turns * (fall - rise) + np.clip(rest - rise, 0.0, fall - rise))
+
+
+def solve_interval(
+    shares: Floats, sigmas: Floats, nominal_length_ticks: float | None = None
+) -> Interval:
+    """The exposure that explains ``shares`` (bits,) with standard deviations ``sigmas`` best.
+
+    The middle is between 0 and ``2**bits``, the length at most a quarter of that.
+    """
+    bits = len(shares)
+    starts: list[tuple[float, float, float, float]] = []
+    for level in range(-3, bits - 2):
+        starts += _starts(shares, sigmas, level, nominal_length_ticks)
+    if not starts:
+        # The stated length is beyond what the board can show; all lengths are tried instead.
+        return solve_interval(shares, sigmas)
+    found = [_zoom(shares, sigmas, s, nominal_length_ticks) for s in sorted(starts)[:_ZOOMED]]
+    _, middle, length = min(found)
+    if length < _SHORT_TICKS:
+        return _averaged(shares, sigmas, middle, nominal_length_ticks)
+    return _with_errors(shares, sigmas, middle, length, nominal_length_ticks)
+
+
+def _starts(
+    shares: Floats, sigmas: Floats, level: int, nominal: float | None
+) -> list[tuple[float, float, float, float]]:
+    """Places to search from, for lengths of ``2**level`` to ``2**(level + 1)`` ticks.
+
+    Each is (cost, middle, length, how far the middle may be off). A bit whose value lasts longer
+    than the exposure changes at most once in it, and then its larger share is its value in the
+    middle; so those bits give the middle to within one such time, by plain Gray decoding.
+    """
+    low, high = 2.0**level, 2.0 ** (level + 1)
+    if nominal is not None and not 0.6 * low <= nominal <= 1.6 * high:
+        return []
+    bits = len(shares)
+    first = min(max(level, 0), bits - 1)
+    bit = shares[first:] > 0.5
+    binary = np.logical_xor.accumulate(bit[::-1])[::-1]
+    count = float((binary * 2.0 ** np.arange(first, bits)).sum())
+    step = 2.0**first
+    middles, lengths = count + step * np.linspace(-1.5, 2.5, 81), np.geomspace(low, high, 9)
+    grid_m, grid_l = np.meshgrid(middles, lengths, indexing="ij")
+    cost = _cost(shares, sigmas, grid_m, grid_l, nominal)
+    best = np.argsort(cost, axis=None)[: 4 * _KEPT : 4]
+    return [
+        (float(cost.flat[k]), float(grid_m.flat[k]), float(grid_l.flat[k]), 0.08 * step)
+        for k in best
+    ]
+
+
+def _cost(
+    shares: Floats, sigmas: Floats, middle: Floats, length: Floats, nominal: float | None
+) -> Floats:
+    misfit = (lit_shares(middle, length, len(shares)) - shares) / sigmas
+    cost = (misfit**2).sum(axis=-1)
+    if nominal is not None:
+        cost = cost + ((length / nominal - 1.0) / _NOMINAL_SIGMA) ** 2
+    return np.asarray(cost)
+
+
+def _zoom(
+    shares: Floats, sigmas: Floats, start: tuple[float, float, float, float], nominal: float | None
+) -> tuple[float, float, float]:
+    """Least cost near a start, and where: (cost, middle, length).
+
+    The cost is piecewise smooth with kinks at every tick, so grids that shrink round the best
+    place are surer than following slopes.
+    """
+    here, half_m, half_l = start[:3], start[3], 0.12 * start[2]
+    for _ in range(_ZOOMS):
+        middles = here[1] + half_m * np.linspace(-1.0, 1.0, _SIDE)
+        lengths = here[2] + half_l * np.linspace(-1.0, 1.0, _SIDE)
+        grid_m, grid_l = np.meshgrid(middles, np.maximum(lengths, _SHORTEST_TICKS), indexing="ij")
+        cost = _cost(shares, sigmas, grid_m, grid_l, nominal)
+        k = int(cost.argmin())
+        here = min(here, (float(cost.flat[k]), float(grid_m.flat[k]), float(grid_l.flat[k])))
+        half_m, half_l = 0.45 * half_m, 0.45 * half_l
+    return here
+
+
+def _with_errors(
+    shares: Floats, sigmas: Floats, middle: float, length: float, nominal: float | None
+) -> Interval:
+    """The interval with standard deviations from the slopes of the shares."""
+    bits = len(shares)
+    step = 1e-3 * length
+    moved = np.array([[step, 0.0], [-step, 0.0], [0.0, step], [0.0, -step]])
+    values = lit_shares(middle + moved[:, 0], length + moved[:, 1], bits)
+    slopes = np.stack([values[0] - values[1], values[2] - values[3]], axis=1) / (2.0 * step)
+    weighted = slopes / sigmas[:, None]
+    # No reading is worse than not knowing where in its length the interval lies.
+    prior = np.array([0.3 * length, 0.5 * length if nominal is None else _NOMINAL_SIGMA * nominal])
+    covariance = np.linalg.inv(weighted.T @ weighted + np.diag(prior**-2.0))
+    sigma = _misfit_scale(shares, sigmas, middle, length) * np.sqrt(np.diag(covariance))
+    return Interval(
+        middle, length, float(sigma[0]), float(sigma[1]), _residual(shares, middle, length)
+    )
+
+
+def _averaged(shares: Floats, sigmas: Floats, middle: float, nominal: float | None) -> Interval:
+    """Mean and standard deviation of all short intervals about ``middle``, by their likelihood.
+
+    An exposure shorter than a tick may show no change at all: every place within the tick is
+    then as likely as any other, which no slope at one place can tell.
+    """
+    middles = middle + np.linspace(-2.0, 2.0, 321)
+    lengths = np.geomspace(_SHORTEST_TICKS, 2.0 * _SHORT_TICKS, 120)
+    grid_m, grid_l = np.meshgrid(middles, lengths, indexing="ij")
+    cost = _cost(shares, sigmas, grid_m, grid_l, nominal)
+    k = int(cost.argmin())
+    scale = _misfit_scale(shares, sigmas, float(grid_m.flat[k]), float(grid_l.flat[k]))
+    weight = np.exp(-0.5 * (cost - cost.min()) / scale**2)
+    weight /= weight.sum()
+    mean_m, mean_l = float((weight * grid_m).sum()), float((weight * grid_l).sum())
+    return Interval(
+        mean_m,
+        mean_l,
+        # The grid itself is no finer than this.
+        float(np.hypot(np.sqrt((weight * (grid_m - mean_m) ** 2).sum()), 0.005)),
+        float(np.hypot(np.sqrt((weight * (grid_l - mean_l) ** 2).sum()), 0.02 * mean_l)),
+        _residual(shares, float(grid_m.flat[k]), float(grid_l.flat[k])),
+    )
+
+
+def _residual(shares: Floats, middle: float, length: float) -> float:
+    misfit = lit_shares(np.array(middle), np.array(length), len(shares)) - shares
+    return float(np.sqrt((misfit**2).mean()))
+
+
+def _misfit_scale(shares: Floats, sigmas: Floats, middle: float, length: float) -> float:
+    """How much larger than stated the errors of the shares seem to be, at least 1."""
+    misfit = (lit_shares(np.array(middle), np.array(length), len(shares)) - shares) / sigmas
+    return max(1.0, float(np.sqrt((misfit**2).sum() / max(len(shares) - 2, 1))))

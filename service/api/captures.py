@@ -1,0 +1,59 @@
+"""``/v1/captures``: what rigs photographed, asked for under ``/v1/rigs/{rig}/captures``."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fastapi import APIRouter, Response
+
+from service.api.context import ServiceDep
+from service.api.job_routes import JobResource
+from service.api.models import Job, Model, problems
+from service.api.rigmodels import CaptureOutcome, CaptureRequest
+from service.rigs.orders import CAPTURE, capture_order
+from service.store.jobrecords import NewJob
+
+router = APIRouter(tags=["captures"])
+
+
+class CaptureJob(Job[CaptureOutcome]):
+    """A capture: running, or ended."""
+
+
+class CapturePage(Model):
+    """Captures, newest first. ``next`` is the cursor of the next page, null on the last."""
+
+    items: list[CaptureJob]
+    next: int | None
+
+
+resource = JobResource(CAPTURE, "captures", CaptureJob, CapturePage, with_files=False)
+
+
+@router.post(
+    "/v1/rigs/{rig}/captures",
+    status_code=201,
+    response_model=CaptureJob,
+    responses=problems(400, 404, 409, 413, 422, 423, 503, 507)
+    | {200: {"model": CaptureJob, "description": "This capture was asked for before."}},
+)
+def add_capture(
+    request: CaptureRequest, response: Response, service: ServiceDep, rig: str
+) -> dict[str, Any]:
+    """Take a capture, now. The answer comes at once; follow the job for what becomes of it.
+
+    The same request again is answered with 200 and the capture there is. 409 while the rig is
+    busy, 423 when its interlock is open, 503 when its box or cameras are not there.
+    """
+    content = request.model_dump()
+    record, fresh = service.rigs.get(rig).begin(
+        NewJob(CAPTURE, {"rig": rig, **content}), request.capture_id, capture_order(content)
+    )
+    document = resource.document(record)
+    response.headers["Location"] = document["links"]["self"]
+    if not fresh:
+        response.status_code = 200
+    return document
+
+
+resource.add_to(router)

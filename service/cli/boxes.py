@@ -1,0 +1,110 @@
+"""``rigwright trigger`` and ``rigwright fake-trigger``: boxes by themselves."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+import typer
+
+from geometry.errors import InputError
+from rig.capture.devices import StationDevices
+from rig.station.spec import TriggerPlan
+from rig.station.stationfile import read_station
+from rig.trigger.box import TriggerBox, TriggerCapabilities, TriggerHealth
+from rig.trigger.fake.program import FakeOptions, run_fake
+from service.cli.output import NOT_WELL, print_json
+from service.cli.running import one_line_errors
+
+WORST_CLOCK_US = 500.0
+"""A worse fit of the box's clock than this says that its line is disturbed."""
+
+
+def run_trigger_selftest_command(url: str | None, station: Path | None, *, as_json: bool) -> None:
+    """Open a box and tell how it is."""
+    with one_line_errors():
+        with _open_box(url, station) as box:
+            health, capabilities = box.health(), box.capabilities
+        document = {"ok": _box_well(health), "health": health, "capabilities": capabilities}
+        if as_json:
+            print_json(document)
+        else:
+            _print_box(health, capabilities)
+    if not _box_well(health):
+        raise typer.Exit(NOT_WELL)
+
+
+def run_trigger_reset_command(url: str | None, station: Path | None) -> None:
+    """Let a box leave its fault."""
+    with one_line_errors(), _open_box(url, station) as box:
+        box.reset()
+        sys.stdout.write(f"the box is {box.health().state}\n")
+
+
+@contextmanager
+def _open_box(url: str | None, station: Path | None) -> Iterator[TriggerBox]:
+    if (url is None) == (station is None):
+        raise InputError("box", "no box, or two, were named", "give --url or --station")
+    plan = TriggerPlan("rigwright", url) if url else read_station(station or Path()).trigger
+    if plan is None:
+        raise InputError("box", "the station has no trigger box", "add [trigger] to its file")
+    with ExitStack() as stack:
+        devices = StationDevices()
+        stack.callback(devices.close)
+        box = devices.make_box(plan)
+        stack.callback(box.close)
+        box.open()
+        yield box
+
+
+def _print_box(health: TriggerHealth, can: TriggerCapabilities) -> None:
+    interlock = {True: "closed", False: "OPEN", None: "none"}[health.interlock_closed]
+    lines = [
+        f"{health.identity}, serial number {health.serial_number}, firmware {health.firmware}",
+        f"state: {health.state}; interlock: {interlock}; started {health.boots} times",
+        f"{can.outputs} outputs, steps of {can.tick_us:g} us, delays up to "
+        f"{can.max_delay_us / 1e6:g} s, pulses up to {can.max_width_us / 1e6:g} s, "
+        f"bursts of up to {can.max_shots}",
+    ]
+    if health.round_trip_p50_ms is not None:
+        lines.append(f"round trip: {health.round_trip_p50_ms:.2f} ms median")
+    if health.clock_residual_us is not None:
+        lines.append(f"its clock is known to {health.clock_residual_us:.0f} us")
+    if health.last_problem:
+        lines.append(f"last problem: {health.last_problem}")
+    sys.stdout.write("".join(line + "\n" for line in lines))
+
+
+def _box_well(health: TriggerHealth) -> bool:
+    residual = health.clock_residual_us
+    return health.interlock_closed is not False and (residual is None or residual <= WORST_CLOCK_US)
+
+
+def run_fake_trigger_command(
+    link: Path | None,
+    port: int | None,
+    serial_number: str,
+    seed: int,
+    faults: str,
+    drift_ppm: float,
+) -> None:
+    """Be a box until interrupted."""
+    with one_line_errors():
+        run_fake(
+            FakeOptions(
+                serial_number=serial_number,
+                link=link,
+                port=port,
+                seed=seed,
+                faults=faults,
+                drift_ppm=drift_ppm,
+            ),
+            _say,
+        )
+
+
+def _say(line: str) -> None:
+    sys.stdout.write(line + "\n")
+    sys.stdout.flush()

@@ -1,0 +1,1 @@
+"""Rigs that stand: the stations this service owns, and what they are asked to do."""

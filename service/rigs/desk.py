@@ -1,0 +1,224 @@
+"""One station of the service: its devices belong to one thread, which does one thing at a time."""
+
+from __future__ import annotations
+
+import queue
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from geometry.errors import (
+    ConflictError,
+    DeviceError,
+    InterlockError,
+    InternalError,
+    RigwrightError,
+)
+from rig.capture.results import RigHealth
+from rig.capture.rig import Rig, open_station
+from rig.station.spec import Station
+from rig.trigger.box import TriggerState
+from service import logs
+from service.jobs.bell import Bell
+from service.jobs.cancels import Cancels
+from service.jobs.manager import end_without_result
+from service.rigs.sessions import Sessions
+from service.store import Store
+from service.store.jobrecords import JobRecord, NewJob
+from service.wire import plain
+from solver.progress import CancelToken, Progress, ProgressCallback
+
+JSON = dict[str, Any]
+Work = Callable[[Rig, Sessions, ProgressCallback, CancelToken], JSON]
+"""What a job does with the open rig; returns its result."""
+
+_REOPEN_S = 5.0
+"""How often devices are looked for that were not there: somebody plugs them in sooner or later."""
+
+_GONE = (TriggerState.DISCONNECTED, TriggerState.OPENING, TriggerState.PROBING)
+
+
+@dataclass(frozen=True)
+class Books:
+    """What a desk writes into: shared by all desks of a service."""
+
+    store: Store
+    bell: Bell
+    cancels: Cancels
+
+
+class RigDesk:
+    """A station, open as long as the service runs.
+
+    Jobs are begun by request threads and done by the desk's own thread; a second one meanwhile
+    is refused, because a capture that waits in a queue is not what its subject sat still for.
+    """
+
+    def __init__(self, station: Station, sessions: Path, books: Books) -> None:
+        self.station = station
+        self._books = books
+        self._sessions = Sessions(sessions)
+        self._lock = threading.Lock()
+        self._orders: queue.SimpleQueue[tuple[JobRecord, Work] | None] = queue.SimpleQueue()
+        self._rig: Rig | None = None
+        self._problem: RigwrightError | None = None
+        self._doing: JobRecord | None = None
+        self._stopping = False
+        self._thread = threading.Thread(target=self._serve, name=f"rig-{station.name}", daemon=True)
+
+    @property
+    def name(self) -> str:
+        """The station's name."""
+        return self.station.name
+
+    def start(self) -> None:
+        """Open the devices and begin to take orders."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End what is being done and let go of the devices."""
+        with self._lock:
+            self._stopping = True
+        self._books.cancels.stop_all()
+        self._orders.put(None)
+        if self._thread.is_alive():
+            self._thread.join()
+
+    def health(self) -> tuple[RigHealth | None, RigwrightError | None, JobRecord | None]:
+        """How the devices are (None: not open), why they are not open, and what is being done."""
+        rig = self._rig
+        return (None if rig is None else rig.health()), self._problem, self._doing
+
+    def abort(self) -> None:
+        """All outputs low, now; what is being done ends. Allowed always, waits for nobody."""
+        rig, doing = self._rig, self._doing
+        if rig is None:
+            raise self._not_open()
+        try:
+            rig.abort()
+        finally:
+            if doing is not None:
+                # Whoever reads the job must see that somebody ended it.
+                with suppress(ConflictError):
+                    self._books.cancels.cancel(doing.id, doing.kind)
+
+    def reset(self) -> None:
+        """Let the box leave its fault.
+
+        Raises :class:`InterlockError` while its interlock is open, :class:`ConflictError` while
+        the rig is busy.
+        """
+        rig = self._rig
+        if rig is None:
+            raise self._not_open()
+        rig.reset()
+
+    def begin(self, new: NewJob, job_id: str, work: Work) -> tuple[JobRecord, bool]:
+        """Begin a job, and whether it is new; the same request again gives the job there is.
+
+        Raises :class:`ConflictError` ``rig-busy`` and ``id-used``, :class:`DeviceError` when box
+        or cameras are not there, :class:`InterlockError` when the interlock is open.
+        """
+        with self._lock:
+            known = self._books.store.jobs.find(job_id)
+            if known is None:
+                self._require_ready(new.kind)
+            record, fresh = self._books.store.jobs.begin(new, job_id)
+            if fresh:
+                self._doing = record
+                self._orders.put((record, work))
+            return record, fresh
+
+    def _require_ready(self, kind: str) -> None:
+        if self._doing is not None:
+            raise ConflictError(
+                "rig-busy",
+                f"rig {self.name!r} is busy with {self._doing.kind} {self._doing.id}",
+                "wait until it has ended, or abort it",
+            )
+        if self._rig is None or self._stopping:
+            raise self._not_open()
+        box = self._rig.health().box
+        if box is None or kind == "rig-test":
+            return
+        if box.state in _GONE:
+            raise DeviceError(
+                "trigger-gone",
+                f"the trigger box of rig {self.name!r} does not answer "
+                f"({box.last_problem or box.state.value})",
+                "check its cable and power; it is looked for again and again",
+            )
+        if box.interlock_closed is False:
+            raise InterlockError(
+                "open", f"the interlock of rig {self.name!r} is open", "close it, then ask again"
+            )
+
+    def _not_open(self) -> RigwrightError:
+        # What stood in the way may be gone: ask the thread to try once more.
+        self._orders.put(None)
+        return self._problem or DeviceError(
+            "rig-opening", f"rig {self.name!r} is being opened", "ask again in a few seconds"
+        )
+
+    def _serve(self) -> None:
+        self._try_to_open()
+        while True:
+            order = self._next_order()
+            if order is not None:
+                self._do(*order)
+            elif self._stopping:
+                break
+            elif self._rig is None:
+                self._try_to_open()
+        self._sessions.close()
+        if self._rig is not None:
+            self._rig.close()
+
+    def _next_order(self) -> tuple[JobRecord, Work] | None:
+        """What is asked for next; None now and then while the rig is not open."""
+        try:
+            return self._orders.get(timeout=_REOPEN_S if self._rig is None else None)
+        except queue.Empty:
+            return None
+
+    def _try_to_open(self) -> None:
+        try:
+            self._rig = open_station(self.station)
+            self._problem = None
+            logs.log.info("rig open", extra={"fields": {"rig": self.name}})
+        except RigwrightError as error:
+            self._problem = error
+            logs.log.warning(
+                "rig not open", extra={"fields": {"rig": self.name, "why": str(error)}}
+            )
+
+    def _do(self, job: JobRecord, work: Work) -> None:
+        token = logs.job_id.set(job.id)
+        jobs = self._books.store.jobs
+        try:
+            if self._rig is None:
+                raise self._not_open()
+            with self._books.cancels.running(job.id) as cancel:
+                result = work(self._rig, self._sessions, self._reporter(job.id), cancel)
+            jobs.complete(job.id, plain(result), {})
+        except RigwrightError as error:
+            end_without_result(self._books.store, job.id, error)
+        except Exception as error:  # noqa: BLE001 - the rig must go on being usable
+            logs.log.exception("a job of a rig could not be done")
+            fault = InternalError("rig-fault", f"a fault ({error!r})", "see the log")
+            end_without_result(self._books.store, job.id, fault)
+        finally:
+            with self._lock:
+                self._doing = None
+            self._books.bell.ring(job.id)
+            logs.job_id.reset(token)
+
+    def _reporter(self, job_id: str) -> ProgressCallback:
+        def report(progress: Progress, /) -> None:
+            self._books.store.jobs.record_progress(job_id, plain(progress))
+            self._books.bell.ring(job_id)
+
+        return report
