@@ -34,8 +34,10 @@ def tilt_sigma(image_px: tuple[int, int]) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Mapped:
-    """Pixels in target units: ``place`` (n, 2), its partials by the parameters (n, 2, SIZE) and
-    by the pixel (n, 2, 2)."""
+    """Pixels in target units.
+
+    ``place`` (n, 2), its partials by the parameters (n, 2, SIZE) and by the pixel (n, 2, 2).
+    """
 
     place: Floats
     by_parameter: Floats

@@ -45,7 +45,7 @@ def version() -> str:
 
 def dictionary_names() -> tuple[str, ...]:
     """Names of all marker dictionaries, for example ``DICT_4X4_50``."""
-    found = {}
+    found: dict[int, str] = {}
     for name in sorted(dir(cv2.aruco)):
         if name.startswith("DICT_"):
             found.setdefault(getattr(cv2.aruco, name), name.upper())
@@ -150,9 +150,7 @@ def components(grey: Bytes, window_px: int, offset: float, dark: bool) -> tuple[
     kind = cv2.THRESH_BINARY_INV if dark else cv2.THRESH_BINARY
     window = min(window_px, 2 * (min(grey.shape) // 2) - 1) | 1
     shift = offset if dark else -offset
-    mask = cv2.adaptiveThreshold(
-        grey, 255, cv2.ADAPTIVE_THRESH_MEAN_C, kind, max(window, 3), shift
-    )
+    mask = cv2.adaptiveThreshold(grey, 255, cv2.ADAPTIVE_THRESH_MEAN_C, kind, max(window, 3), shift)
     _, labels, statistics, centroids = cv2.connectedComponentsWithStats(mask, connectivity=4)
     return labels, np.asarray(statistics, dtype=np.int64), np.asarray(centroids, dtype=np.float64)
 
@@ -209,3 +207,44 @@ def video_frames(path: Path) -> Iterator[Bytes]:
             yield np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY))
     finally:
         video.release()
+
+
+def sampled(grey: Bytes, places_px: Floats) -> Floats:
+    """Grey levels (n, m) between pixels at places (n, m, 2); outside the picture black."""
+    x, y = (np.ascontiguousarray(places_px[..., k], dtype=np.float32) for k in range(2))
+    if x.size == 0:
+        return np.zeros(x.shape)
+    # OpenCV takes at most 32767 rows of places.
+    parts = [
+        cv2.remap(grey, x[k : k + 30000], y[k : k + 30000], cv2.INTER_LINEAR)
+        for k in range(0, len(x), 30000)
+    ]
+    return np.concatenate(parts).astype(np.float64)
+
+
+def pose_agreement(
+    places_mm: Floats, pixels: Floats, size_px: tuple[int, int], tolerance_px: float
+) -> Bools | None:
+    """Which of n places (n, 3) appear where one pose of a camera of usual lens puts them, (n,).
+
+    The camera is not known yet: a focal length of one and a half pictures is taken, and the
+    tolerance must be wide. None when no pose is found.
+    """
+    width, height = size_px
+    focal = 1.5 * max(size_px)
+    matrix = np.array([[focal, 0, width / 2], [0, focal, height / 2], [0, 0, 1.0]])
+    cv2.setRNGSeed(1)
+    done, _, _, rows = cv2.solvePnPRansac(
+        np.ascontiguousarray(places_mm, dtype=np.float64),
+        np.ascontiguousarray(pixels, dtype=np.float64),
+        matrix,
+        None,
+        reprojectionError=tolerance_px,
+        iterationsCount=300,
+        flags=cv2.SOLVEPNP_EPNP,
+    )
+    if not done or rows is None:
+        return None
+    mask = np.zeros(len(pixels), dtype=bool)
+    mask[np.asarray(rows).reshape(-1)] = True
+    return mask

@@ -73,7 +73,7 @@ def fit_saddles(windows: Windows, start_px: Floats, axes_px: Floats, guard: Guar
         weight = guard.weights(windows, windows.anchors_px + state[:, :2], axes_px, state[:, 4])
         residual, partials = _model(windows, state)
         if step == 0:
-            state = _linear_start(state, windows.values, weight, residual, partials)
+            state = _linear_start(state, windows.values, weight, partials)
             continue
         normal, right, noise = _normal_equations(residual, partials, weight, state)
         move = _solve(normal, right)
@@ -189,9 +189,7 @@ def _density(hh: Floats, hk: Floats, r: Floats) -> Floats:
     return np.asarray(2.0 / (np.pi * np.sqrt(rest)) * np.exp((2.0 * r * hk - hh) / (2.0 * rest)))
 
 
-def _linear_start(
-    state: Floats, values: Floats, weight: Floats, residual: Floats, partials: Floats
-) -> Floats:
+def _linear_start(state: Floats, values: Floats, weight: Floats, partials: Floats) -> Floats:
     """Mean and contrast of the first guess, both linear."""
     linear = partials[..., 5:7]
     normal = np.einsum("npi,np,npj->nij", linear, weight, linear)
@@ -220,7 +218,7 @@ def _normal_equations(
 
 
 def _inverse(matrices: Floats) -> Floats:
-    good = np.isfinite(matrices).all(axis=(1, 2))
+    good = np.asarray(np.isfinite(matrices).all(axis=(1, 2)))
     safe = np.where(good[:, None, None], matrices, np.eye(matrices.shape[1]))
     return np.asarray(np.linalg.inv(safe))
 

@@ -19,7 +19,7 @@ from calibration.detection import localmap
 from calibration.targets.patterns import SOFTNESS, Pattern
 from geometry.arrays import Bools, Floats
 
-SAMPLES=3
+SAMPLES = 3
 BLUR, BLACK, STEP, SLOPE, SPREAD = 10, 11, 12, slice(13, 15), 15
 SIZE = 16
 """Parameters: the map's ten, blur (px), level of black, step to white, slope x and y, spread."""
@@ -122,7 +122,9 @@ def fit_template(
             state = _with_levels(state, expected.white.ravel(), values, weight)
         partials, grey = _partials(state, expected, pixels)
         residual = values - grey
-        normal, right, noise = _equations(partials, residual, weight, state, prior_mean, prior_sigma)
+        normal, right, noise = _equations(
+            partials, residual, weight, state, prior_mean, prior_sigma
+        )
         inverse = _inverse(normal)
         if inverse is None:
             return None
@@ -176,9 +178,7 @@ def synthesise(pattern: Pattern, state: Floats, window: Window) -> Expected:
     return Expected(white, along_x, along_y, by_blur)
 
 
-def _sampled(
-    pattern: Pattern, state: Floats, window: Window, reach: int, samples: int
-) -> Floats:
+def _sampled(pattern: Pattern, state: Floats, window: Window, reach: int, samples: int) -> Floats:
     """Share of white on the fine grid; pixels of one colour are asked once."""
     height, width = (n + 2 * reach for n in window.values.shape)
     pitch = window.pitch_px
@@ -189,7 +189,7 @@ def _sampled(
     place = localmap.places(state, middles)
     fine_box = float(size[0]) / samples, float(size[1]) / samples
     coarse_box = float(size[0]), float(size[1])
-    if max(coarse_box) < pattern.finest_mm:
+    if 2.0 * max(coarse_box) < pattern.finest_mm:
         coarse = pattern.white_share(place[:, 0], place[:, 1], coarse_box)
         mixed = (coarse > 1e-9) & (coarse < 1.0 - 1e-9)
     else:

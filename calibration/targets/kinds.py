@@ -128,7 +128,7 @@ class CharucoPlate:
     def corner_grid_mm(self) -> Floats:
         """Inner corners (m, 2) as drawn."""
         x, y = np.meshgrid(np.arange(1, self.columns), np.arange(1, self.rows))
-        return np.stack([x.ravel(), y.ravel()], axis=1) * self.square_mm
+        return np.stack([x.ravel(), y.ravel()], axis=1).astype(np.float64) * self.square_mm
 
     @property
     def ids(self) -> tuple[str, ...]:

@@ -25,7 +25,6 @@ from calibration.targets.kinds import (
 )
 from geometry.arrays import Bools, Floats, Ints
 
-
 SOFTNESS = float(np.sqrt(1.0 / 6.0))
 
 
@@ -145,9 +144,7 @@ class RingPattern:
         return black if self.inverted else 1.0 - black
 
 
-def _polar(
-    x_mm: Floats, y_mm: Floats, box_mm: tuple[float, float]
-) -> tuple[Floats, Floats]:
+def _polar(x_mm: Floats, y_mm: Floats, box_mm: tuple[float, float]) -> tuple[Floats, Floats]:
     """Distance from the origin, and the box's size along that direction."""
     away = np.maximum(np.hypot(x_mm, y_mm), 1e-12)
     return away, np.hypot(x_mm * box_mm[0], y_mm * box_mm[1]) / away
@@ -193,7 +190,7 @@ class PlatePattern:
 
     @property
     def _modules_per_marker(self) -> int:
-        return self.modules.shape[0] // self.plate.rows
+        return len(self.modules) // self.plate.rows
 
     def white_share(self, x_mm: Floats, y_mm: Floats, box_mm: tuple[float, float]) -> Floats:
         """Share of white in boxes about the places."""

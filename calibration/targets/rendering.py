@@ -1,8 +1,8 @@
 """What a camera sees of targets: exact pictures, to judge detection by.
 
 A pixel is the integral over its area of the lens's Gaussian blur of the pattern. The pattern is
-sampled as means over small boxes, ``SUPERSAMPLING`` a pixel each way, so an edge is placed to
-about a ten-thousandth of a pixel; blur and pixel are one kernel, applied to those samples.
+sampled as means over small soft boxes, ``SUPERSAMPLING`` a pixel each way, so that edges keep
+their place between samples; blur and pixel are one kernel, applied to those samples.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from calibration.targets.patterns import SOFTNESS, Pattern
 from geometry.arrays import Floats
 from geometry.camera import Camera, distort, undistort
 
-SUPERSAMPLING = 8
+SUPERSAMPLING = 4
 _TILE = 64
 _NODES = 9
 _INVERSE_STEPS = 60
@@ -60,7 +60,7 @@ def render(
 ) -> Floats:
     """Grey levels (H, W) of the patterns, later ones before earlier ones; no noise yet."""
     width, height = camera.image_size_px
-    image = np.full((height, width), background)
+    image = np.full((height, width), float(background))
     for item in placed:
         left, top, right, bottom = _bounds(camera, item, 4.0 * blur_px + 2.0)
         for y in range(top, bottom, _TILE):
@@ -105,30 +105,39 @@ def _tile(
     reach = int(np.ceil(4.5 * blur_px)) + 1
     across, down = (_kernel(n, reach, blur_px) for n in size)
     plane_x, plane_y, box = _plane_grid(camera, item, corner, size, reach)
-    cover = _cover(item.pattern, plane_x, plane_y, box)
-    share = _share(item.pattern, plane_x, plane_y, box) * cover
+    cover, share = _samples(item.pattern, plane_x, plane_y, box)
     return down @ share @ across.T, down @ cover @ across.T
+
+
+def _samples(
+    pattern: Pattern, x: Floats, y: Floats, box: tuple[float, float]
+) -> tuple[Floats, Floats]:
+    """Cover and covered white of all samples; pixels of one colour are asked once."""
+    n = SUPERSAMPLING
+    pixel = box[0] * n, box[1] * n
+    blocks = [v.reshape(v.shape[0] // n, n, -1, n).transpose(0, 2, 1, 3) for v in (x, y)]
+    middle = [v.mean(axis=(2, 3)) for v in blocks]
+    cover = _cover(pattern, middle[0], middle[1], pixel)
+    if 2.0 * max(pixel) < pattern.finest_mm:
+        share = pattern.white_share(middle[0], middle[1], pixel)
+        mixed = (cover > 0.0) & ((cover < 1.0) | ((share > 1e-9) & (share < 1.0 - 1e-9)))
+    else:
+        share, mixed = np.zeros_like(cover), cover > 0.0
+    parts = []
+    inner = [v[mixed] for v in blocks]
+    fine_cover = _cover(pattern, inner[0], inner[1], box)
+    fine_share = pattern.white_share(inner[0], inner[1], box) * fine_cover
+    for coarse, fine in ((cover, fine_cover), (share * cover, fine_share)):
+        whole = np.repeat(np.repeat(coarse, n, axis=0), n, axis=1)
+        by_block = whole.reshape(blocks[0].shape[0], n, -1, n).transpose(0, 2, 1, 3)
+        by_block[mixed] = fine
+        parts.append(whole)
+    return parts[0], parts[1]
 
 
 def _cover(pattern: Pattern, x: Floats, y: Floats, box: tuple[float, float]) -> Floats:
     left, top, right, bottom = pattern.extent_mm
     return _between(x, left, right, box[0]) * _between(y, top, bottom, box[1])
-
-
-def _share(pattern: Pattern, x: Floats, y: Floats, box: tuple[float, float]) -> Floats:
-    """Share of white of all samples; pixels of one colour are asked once, not 64 times."""
-    n = SUPERSAMPLING
-    pixel = box[0] * n, box[1] * n
-    if max(pixel) >= pattern.finest_mm:
-        return pattern.white_share(x, y, box)
-    blocks = [v.reshape(v.shape[0] // n, n, -1, n) for v in (x, y)]
-    coarse = pattern.white_share(*(v.mean(axis=(1, 3)) for v in blocks), pixel)
-    mixed = (coarse > 1e-9) & (coarse < 1.0 - 1e-9)
-    share = np.repeat(np.repeat(coarse, n, axis=0), n, axis=1).reshape(blocks[0].shape)
-    by_block = share.transpose(0, 2, 1, 3)
-    inner = (v.transpose(0, 2, 1, 3)[mixed] for v in blocks)
-    by_block[mixed] = pattern.white_share(*inner, box)
-    return share.reshape(x.shape)
 
 
 def _plane_grid(
@@ -147,7 +156,7 @@ def _plane_grid(
     grid = np.stack(np.meshgrid(knots[0], knots[1]), axis=-1).reshape(-1, 2)
     exact = item.plane(camera, grid).reshape(_NODES, _NODES, 2)
     middle = np.array([corner]) + np.array([size]) / 2.0
-    step = item.plane(camera, np.concatenate([middle, middle + [1, 0], middle + [0, 1]]))
+    step = item.plane(camera, middle + np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]))
     box = np.hypot(step[1] - step[0], step[2] - step[0])
     box = np.maximum(box, 1e-9) / SUPERSAMPLING
     fine = [weights[1] @ exact[..., k] @ weights[0].T for k in range(2)]
