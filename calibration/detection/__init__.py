@@ -1,0 +1,1 @@
+"""From pictures to observations: which targets were seen, where, and how surely."""

@@ -1,0 +1,174 @@
+"""Why a picture shows none of the targets it should: the usual reasons, tried one by one."""
+
+from __future__ import annotations
+
+from calibration.detection import opencv
+from calibration.detection.found import Finding
+from calibration.detection.gates import Gates
+from calibration.detection.images import Picture
+from calibration.detection.opencv import Markers
+from calibration.detection.plates import LAYOUT_AGREEMENT, agreeing, plane_markers
+from calibration.detection.rings import mirrored_codes, ring_dots
+from calibration.targets.kinds import (
+    CharucoPlate,
+    MarkerCarrier,
+    RingCarrier,
+    TargetPlan,
+    marker_numbers,
+)
+
+_ENOUGH_MARKERS = 4
+_MOST_COLUMNS = 30
+_FEW = 8
+"""Some codes look the same in a mirror: a few targets can be found in a mirrored picture."""
+
+
+def diagnose(picture: Picture, plan: TargetPlan, gates: Gates, found: int) -> tuple[Finding, ...]:
+    """What explains that a plate, or all targets, are missing; empty when nothing does.
+
+    ``found`` is how many targets were found. Plates whose markers lie otherwise than they should
+    are reported in any case; the slower questions are asked only when nothing was found.
+    """
+    findings = [
+        finding
+        for plate in plan.carriers
+        if isinstance(plate, CharucoPlate) and (finding := plate_layout(picture, plate)) is not None
+    ]
+    if findings or found > _FEW:
+        return tuple(findings)
+    questions = (_mirrored,) if found else (_mirrored, _inverted, _other_dictionary)
+    for question in questions:
+        answer = question(picture, plan, gates, found)
+        if answer is not None:
+            return (answer,)
+    return ()
+
+
+def plate_layout(picture: Picture, plate: CharucoPlate) -> Finding | None:
+    """Whether the markers seen lie as on another plate than the one described."""
+    side = picture.negative if plate.inverted else picture
+    markers = opencv.detect_markers(side.grey, plate.dictionary)
+    own, _ = plane_markers(plate, markers)
+    if len(own) < _ENOUGH_MARKERS or agreeing(plate, markers).mean() >= LAYOUT_AGREEMENT:
+        return None
+    return other_layout(plate, markers)
+
+
+def other_layout(plate: CharucoPlate, markers: Markers) -> Finding:
+    """The plate that fits the markers best, in words."""
+    best, share = None, LAYOUT_AGREEMENT
+    for columns in sorted(range(3, _MOST_COLUMNS), key=lambda c: c != plate.rows):
+        for legacy in (plate.legacy, not plate.legacy):
+            trial = _variant(plate, columns, legacy)
+            own, _ = plane_markers(trial, markers)
+            agreement = float(agreeing(trial, markers).mean()) if len(own) else 0.0
+            if len(own) >= _ENOUGH_MARKERS and agreement > share:
+                best, share = trial, agreement
+    name = plate.name
+    if best is None:
+        return Finding(
+            "other-board",
+            f"the markers of plate {name!r} do not lie as on a plate of {plate.columns} columns",
+            "check columns, rows and dictionary in the target file against the printed plate",
+        )
+    if best.columns == plate.columns:
+        return Finding(
+            "legacy",
+            f"plate {name!r} is printed in the {'legacy' if best.legacy else 'present'} pattern",
+            f"set legacy = {str(best.legacy).lower()} in the target file",
+        )
+    if best.columns == plate.rows:
+        return Finding(
+            "swapped",
+            f"plate {name!r} has {plate.rows} columns and {plate.columns} rows, not "
+            f"{plate.columns} columns and {plate.rows} rows",
+            "exchange columns and rows in the target file",
+        )
+    return Finding(
+        "other-board",
+        f"plate {name!r} has {best.columns} columns, not {plate.columns}",
+        "correct columns and rows in the target file, or use the right plate",
+    )
+
+
+def _variant(plate: CharucoPlate, columns: int, legacy: bool) -> CharucoPlate:
+    """A plate of other columns with rows enough for all markers, first square white or black.
+
+    Only the parity of the rows matters to where a legacy pattern begins; even is taken.
+    """
+    rows = plate.columns if columns == plate.rows else plate.rows
+    rows = max(rows, -(-2 * (plate.columns * plate.rows) // columns) // 2)
+    if columns not in (plate.columns, plate.rows) or (legacy and rows % 2):
+        rows += rows % 2
+    return CharucoPlate(
+        plate.name,
+        columns,
+        max(rows, 3),
+        plate.square_mm,
+        plate.marker_mm,
+        plate.dictionary,
+        plate.first_marker,
+        legacy,
+    )
+
+
+def _mirrored(picture: Picture, plan: TargetPlan, gates: Gates, found: int) -> Finding | None:
+    rings = [c for c in plan.carriers if isinstance(c, RingCarrier)]
+    count = 0
+    for inverted in sorted({c.inverted for c in plan.carriers}):
+        side = picture.negative if inverted else picture
+        count += _known_markers(side.mirrored, plan, inverted)
+        mine = [c for c in rings if c.inverted == inverted]
+        count += mirrored_codes(side, ring_dots(side, gates), mine) if mine else 0
+    if count < max(2.0, 0.5 * found):
+        return None
+    return Finding(
+        "mirrored",
+        f"the picture is mirrored: {count} targets can be read in a mirror only",
+        "switch off mirroring or flipping in the camera or its viewer, and take it again",
+    )
+
+
+def _inverted(picture: Picture, plan: TargetPlan, gates: Gates, found: int) -> Finding | None:
+    del gates, found
+    for inverted in sorted({c.inverted for c in plan.carriers}):
+        side = picture if inverted else picture.negative
+        if _known_markers(side, plan, inverted) >= 2:
+            return Finding(
+                "inverted",
+                "the targets are printed with black and white exchanged",
+                f"set inverted = {str(not inverted).lower()} in the target file",
+            )
+    return None
+
+
+def _known_markers(picture: Picture, plan: TargetPlan, inverted: bool) -> int:
+    count = 0
+    wanted = {n for c in plan.carriers if c.inverted == inverted for n in marker_numbers(c)}
+    for dictionary in sorted({name for name, _ in wanted}):
+        numbers = opencv.detect_markers(picture.grey, dictionary).ids.tolist()
+        count += sum((dictionary, n) in wanted for n in numbers)
+    return count
+
+
+def _other_dictionary(
+    picture: Picture, plan: TargetPlan, gates: Gates, found: int
+) -> Finding | None:
+    del gates, found
+    carriers = [c for c in plan.carriers if isinstance(c, CharucoPlate | MarkerCarrier)]
+    if not carriers:
+        return None
+    mine = sorted({c.dictionary for c in carriers})
+    counts = {
+        name: len(opencv.detect_markers(picture.grey, name))
+        for name in opencv.dictionary_names()
+        if name not in mine
+    }
+    name = max(counts, key=lambda n: (counts[n], -opencv.dictionary_size(n)))
+    if counts[name] < _ENOUGH_MARKERS:
+        return None
+    return Finding(
+        "dictionary",
+        f"the picture shows {counts[name]} markers of {name}, none of {', '.join(mine)}",
+        "give the target file of the targets in the picture",
+    )

@@ -1,0 +1,211 @@
+"""Targets in the pictures of many cameras: from files to observations."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Executor, Future
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from calibration.detection.finding import as_picture, find_targets
+from calibration.detection.found import Detections
+from calibration.detection.gates import Gates
+from calibration.detection.opencv import AnyImage
+from calibration.observations import Observations
+from calibration.targets.kinds import TargetPlan
+from geometry.errors import CancelledError, InputError
+from solver.progress import CancelToken, NeverCancelled, Progress, ProgressCallback, ignore_progress
+
+_POLL_S = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class TakenPicture:
+    """One picture: by which camera, in which frame, as a file or an array as detection takes it."""
+
+    camera: str
+    frame: str
+    image: Path | AnyImage
+
+    @property
+    def name(self) -> str:
+        """What to call it in a message."""
+        if isinstance(self.image, Path):
+            return self.image.name
+        return f"the picture of {self.camera} in frame {self.frame}"
+
+
+@dataclass(frozen=True, eq=False)
+class DetectedPictures:
+    """What was found: ``detections`` belong to ``pictures``, one each, in order."""
+
+    observations: Observations
+    pictures: tuple[TakenPicture, ...]
+    detections: tuple[Detections, ...]
+
+    def counts(self) -> dict[str, int]:
+        """Targets found by each camera in all its pictures."""
+        total = dict.fromkeys(self.observations.cameras, 0)
+        for picture, found in zip(self.pictures, self.detections, strict=True):
+            total[picture.camera] += len(found)
+        return total
+
+
+@dataclass(frozen=True, eq=False)
+class DetectionJob:
+    """Detection in one picture, to be called in this or another process."""
+
+    picture: TakenPicture
+    plan: TargetPlan
+    gates: Gates
+    explain: bool = False
+
+    def __call__(self) -> Detections:
+        """Read the picture and find the targets; errors name the picture."""
+        image = self.picture.image
+        if not isinstance(image, Path):
+            try:
+                return find_targets(image, self.plan, self.gates, self.explain)
+            except InputError as error:
+                problem = error.problem.replace("the picture", self.picture.name, 1)
+                raise InputError(error.detail, problem, error.remedy) from error
+        return find_targets(as_picture(image), self.plan, self.gates, self.explain)
+
+
+def detect_pictures(
+    pictures: Sequence[TakenPicture],
+    plan: TargetPlan,
+    *,
+    gates: Gates | None = None,
+    progress: ProgressCallback = ignore_progress,
+    cancel: CancelToken | None = None,
+    executor: Executor | None = None,
+) -> DetectedPictures:
+    """Targets in all pictures. Cameras and frames keep the order in which they first come.
+
+    Work goes to ``executor`` when there is one (jobs and results can be pickled), else it is
+    done here. Raises :class:`CancelledError`, and one-line :class:`InputError` for: no pictures,
+    two of one camera and frame, a picture that cannot be read, pictures of one camera in
+    different sizes, and a camera that saw no target at all, with the reason where it is known.
+    """
+    gates = Gates() if gates is None else gates
+    _check_list(pictures)
+    jobs = [DetectionJob(picture, plan, gates) for picture in pictures]
+    found: list[Detections] = []
+    for number, result in enumerate(_results(jobs, cancel or NeverCancelled(), executor), 1):
+        _check_size(pictures, found, result)
+        found.append(result)
+        progress(Progress("detection", number / len(jobs), iteration=number))
+    _check_seen(jobs, found)
+    observations = _observations(pictures, found, plan)
+    return DetectedPictures(observations, tuple(pictures), tuple(found))
+
+
+def _results(
+    jobs: Sequence[DetectionJob], cancel: CancelToken, executor: Executor | None
+) -> Iterator[Detections]:
+    if executor is None:
+        for job in jobs:
+            if cancel.is_set():
+                raise CancelledError
+            yield job()
+        return
+    futures = [executor.submit(job) for job in jobs]
+    try:
+        for future in futures:
+            yield _awaited(future, cancel)
+    finally:
+        for future in futures:
+            future.cancel()
+
+
+def _awaited(future: Future[Detections], cancel: CancelToken) -> Detections:
+    while True:
+        if cancel.is_set():
+            raise CancelledError
+        try:
+            return future.result(_POLL_S)
+        except TimeoutError:
+            continue
+
+
+def _check_list(pictures: Sequence[TakenPicture]) -> None:
+    if not pictures:
+        raise InputError("pictures-none", "there are no pictures", "give at least one per camera")
+    taken = Counter((p.camera, p.frame) for p in pictures)
+    (camera, frame), count = taken.most_common(1)[0]
+    if count > 1:
+        raise InputError(
+            "pictures-twice",
+            f"there are {count} pictures of camera {camera} in frame {frame}",
+            "give one picture of each camera in each frame",
+        )
+
+
+def _check_size(
+    pictures: Sequence[TakenPicture], found: Sequence[Detections], result: Detections
+) -> None:
+    this = pictures[len(found)]
+    for other, earlier in zip(pictures, found, strict=False):
+        if other.camera == this.camera and earlier.image_size_px != result.image_size_px:
+            raise InputError(
+                "pictures-sizes",
+                f"{this.name} has {_text(result)} pixels, {other.name} of the same camera "
+                f"{this.camera} has {_text(earlier)}",
+                "give pictures of one size and orientation for each camera",
+            )
+
+
+def _text(found: Detections) -> str:
+    return "{} x {}".format(*found.image_size_px)
+
+
+def _check_seen(jobs: Sequence[DetectionJob], found: Sequence[Detections]) -> None:
+    """Every camera must have seen something; the one that has not is asked why."""
+    cameras = dict.fromkeys(job.picture.camera for job in jobs)
+    for camera in cameras:
+        mine = [k for k, job in enumerate(jobs) if job.picture.camera == camera]
+        if any(len(found[k]) for k in mine):
+            continue
+        job = jobs[mine[0]]
+        explained = DetectionJob(job.picture, job.plan, job.gates, explain=True)()
+        if explained.findings:
+            raise explained.findings[0].error(f"camera {camera}")
+        rejected = Counter(r.rule.value for k in mine for r in found[k].rejections)
+        seen = f"; {sum(rejected.values())} were rejected, most by rule {_most(rejected)}"
+        raise InputError(
+            "targets-none",
+            f"camera {camera} shows no target of set {job.plan.name!r} in its {len(mine)} "
+            f"pictures{seen if rejected else ''}",
+            "check that the targets are in view, sharp and well lit, and that the target file "
+            "is theirs",
+        )
+
+
+def _most(counts: Counter[str]) -> str:
+    return counts.most_common(1)[0][0]
+
+
+def _observations(
+    pictures: Sequence[TakenPicture], found: Sequence[Detections], plan: TargetPlan
+) -> Observations:
+    targets = plan.target_set()
+    cameras = tuple(dict.fromkeys(p.camera for p in pictures))
+    frames = tuple(dict.fromkeys(p.frame for p in pictures))
+    sizes = {p.camera: d.image_size_px for p, d in zip(pictures, found, strict=True)}
+    order = {name: k for k, name in enumerate(targets.ids)}
+    counts = [len(d) for d in found]
+    return Observations(
+        targets,
+        cameras,
+        np.array([sizes[c] for c in cameras], dtype=np.int64),
+        frames,
+        np.repeat([cameras.index(p.camera) for p in pictures], counts),
+        np.repeat([frames.index(p.frame) for p in pictures], counts),
+        np.array([order[i] for d in found for i in d.ids], dtype=np.int64),
+        np.concatenate([d.pixel for d in found]),
+        np.concatenate([d.sigma_px for d in found]),
+    )
