@@ -64,7 +64,7 @@ def add_design(
     scan = service.store.scans.get(request.scan_id)
     given = {"cameras": request.cameras, "seed": request.seed}
     rig = rig_for_scan(request.rig, scan, {k: v for k, v in given.items() if v is not None})
-    return submit(service, resource, {"rig": rig}, scan, idempotency_key, response)
+    return submit(service, resource, {"rig": rig}, idempotency_key, response, scan=scan)
 
 
 resource.add_to(router)

@@ -66,9 +66,8 @@ def add_evaluation(
         by_alias=True, exclude_unset=True, include={"schema_", "name", "cameras"}
     )
     design_from_mapping(design, "design", rig_from_mapping(rig).camera)
-    return submit(
-        service, resource, {"rig": rig, "design": design}, scan, idempotency_key, response
-    )
+    content = {"rig": rig, "design": design}
+    return submit(service, resource, content, idempotency_key, response, scan=scan)
 
 
 resource.add_to(router)

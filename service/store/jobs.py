@@ -184,11 +184,17 @@ class Jobs:
         rows = self._database.read(lambda connection: connection.execute(query).mappings().all())
         return [FileRecord(**row, path=self._files.path(row["sha256"])) for row in rows]
 
-    def inputs(self, job_id: str) -> dict[str, tuple[str, Path]]:
-        """The files a job was given: by role the name, and where it is kept."""
+    def given(self, job_id: str) -> list[JobInput]:
+        """The files a job was given."""
         query = select(job_inputs).where(job_inputs.c.job_id == job_id)
         rows = self._database.read(lambda connection: connection.execute(query).mappings().all())
-        return {row["role"]: (row["name"], self._files.path(row["blob_sha256"])) for row in rows}
+        return [JobInput(row["role"], row["name"], row["blob_sha256"]) for row in rows]
+
+    def inputs(self, job_id: str) -> dict[str, tuple[str, Path]]:
+        """The same: by role the name, and where it is kept."""
+        return {
+            given.role: (given.name, self._files.path(given.sha256)) for given in self.given(job_id)
+        }
 
     def claim_next(self) -> JobRecord | None:
         """Turn the oldest pending job into a running one; None when nothing waits."""

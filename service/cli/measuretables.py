@@ -1,0 +1,119 @@
+"""Calibrations, checks and acceptance tests as tables on standard output."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+JSON = dict[str, Any]
+_LIGHTS = {"green": "green", "yellow": "yellow", "red": "red"}
+
+
+def _number(value: float | None, digits: int = 3) -> str:
+    return "-" if value is None else f"{value:.{digits}f}"
+
+
+def _say(*lines: str) -> None:
+    console = Console(highlight=False)
+    for line in lines:
+        console.print(line, markup=False)
+
+
+def _print_detection(detection: JSON) -> None:
+    rejected = sum(row["count"] for row in detection["rejected"])
+    rules = ", ".join(f"{row['count']} {row['rule']}" for row in detection["rejected"])
+    _say(
+        f"{detection['targets']} targets in {detection['pictures']} pictures of "
+        f"{len(detection['cameras'])} cameras, {detection['frames']} frames; "
+        f"{rejected} not used{f' ({rules})' if rules else ''}"
+    )
+
+
+def print_calibration(result: JSON) -> None:
+    """A calibration: what it is worth, camera by camera."""
+    _print_detection(result["detection"])
+    table = Table(
+        *(
+            "Camera",
+            "Points",
+            "rms px",
+            "f px",
+            "+-",
+            "Position +- mm",
+            "Rotation +- deg",
+            "Filled",
+        ),
+        title="Cameras (sigmas are 1 sigma)",
+        title_justify="left",
+    )
+    for row in result["cameras"]:
+        table.add_row(
+            escape(row["name"]),
+            str(row["points"]),
+            _number(row["rms_px"]),
+            _number(row["focal_length_px"], 1),
+            _number(row["focal_sigma_px"], 2),
+            _number(row["position_sigma_mm"]),
+            _number(row["rotation_sigma_deg"], 4),
+            f"{100.0 * row['coverage']:.0f} %",
+        )
+    Console().print(table)
+    cross = result["cross_validation"]
+    _say(
+        f"rms {_number(result['rms_px'])} px, {result['rejected']} points left out; "
+        f"scale from {result['scale']}"
+        + ("" if cross is None else f"; two halves differ by {cross:.2f} of what is predicted")
+    )
+    if not result["converged"]:
+        _say(f"warning: not converged ({result['why_stopped']})")
+    _say(*(f"warning: {text}" for text in result["warnings"]))
+
+
+def print_check(result: JSON) -> None:
+    """A check: the light, the findings, and each camera."""
+    _print_detection(result["detection"])
+    light = result["light"]
+    console = Console(highlight=False)
+    console.print(f"[bold {_LIGHTS[light]}]{light.upper()}[/]  {escape(result['text'])}")
+    table = Table(
+        *("Camera", "Verdict", "Test", "Limit", "Effect mm", "Effect px", "Could hide mm"),
+        title="Cameras (effects at the subject)",
+        title_justify="left",
+    )
+    for row in result["cameras"]:
+        table.add_row(
+            escape(row["name"]),
+            row["verdict"] + (f" ({escape(row['reason'])})" if row["reason"] else ""),
+            _number(row["pose_statistic"], 1),
+            _number(row["pose_limit"], 1),
+            _number(row["effect_mm"]),
+            _number(row["effect_px"]),
+            _number(row["hidden_mm"]),
+        )
+    Console().print(table)
+    _say(*result["notes"])
+
+
+def print_acceptance(result: JSON) -> None:
+    """An acceptance test: the outcome, and each length."""
+    _print_detection(result["detection"])
+    _say(result["text"], *(f"missing: {text}" for text in result["missing"]))
+    table = Table(
+        *("Line", "Length", "Calibrated mm", "Error um", "Limit um", ""),
+        title="Lengths",
+        title_justify="left",
+    )
+    for row in result["lengths"]:
+        table.add_row(
+            escape(row["line"]),
+            escape(f"{row['first']} - {row['second']}"),
+            _number(row["calibrated_mm"], 4),
+            f"{row['error_um']:+.1f}",
+            _number(row["limit_um"], 1),
+            "" if row["within"] else "BEYOND",
+        )
+    Console().print(table)
+    _say(*result["notes"])

@@ -1,0 +1,126 @@
+"""Finds the targets in a task's pictures, wherever those come from."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import Executor, ProcessPoolExecutor
+from contextlib import contextmanager
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+from calibration.detection.gates import Rejection
+from calibration.detection.pictures import DetectedPictures, TakenPicture, detect_pictures
+from calibration.detection.selftest import require_opencv
+from calibration.targets.kinds import TargetPlan
+from service.pictures.archive import unpack
+from service.pictures.listing import Picture, pictures_in_folder, pictures_in_session
+from service.wire import plain
+from solver.progress import CancelToken, Progress, ProgressCallback
+
+JSON = dict[str, Any]
+DETECTING = 0.85
+"""Share of the progress that goes to detection: the rest takes seconds."""
+
+_WORTH_PROCESSES = 8
+"""Fewer pictures are found in less time than processes take to start."""
+
+
+def see(
+    plan: TargetPlan,
+    request: Mapping[str, Any],
+    inputs: Mapping[str, Path],
+    folder: Path,
+    report: ProgressCallback,
+    cancel: CancelToken,
+) -> DetectedPictures:
+    """The targets of ``plan`` in the pictures that a task was given.
+
+    Those are an archive (input ``pictures``), or the ``session`` or ``pictures`` folder that the
+    request names. Writes ``detections.json`` into ``folder``.
+    """
+    report(Progress("reading the pictures", 0.0))
+    require_opencv()
+    with tempfile.TemporaryDirectory(prefix="pictures-", dir=folder.parent) as temporary:
+        pictures = _pictures(request, inputs, Path(temporary))
+
+        def within(inner: Progress, /) -> None:
+            report(
+                Progress("finding targets", DETECTING * inner.fraction, iteration=inner.iteration)
+            )
+
+        with _executor(int(request["workers"]), len(pictures)) as executor:
+            seen = detect_pictures(
+                [TakenPicture(p.camera, p.frame, p.path) for p in pictures],
+                plan,
+                progress=within,
+                cancel=cancel,
+                executor=executor,
+            )
+    document = json.dumps(_document(seen), allow_nan=False) + "\n"
+    (folder / "detections.json").write_text(document, encoding="utf-8")
+    return seen
+
+
+def _pictures(
+    request: Mapping[str, Any], inputs: Mapping[str, Path], temporary: Path
+) -> Sequence[Picture]:
+    if "pictures" in inputs:
+        unpack(inputs["pictures"], temporary)
+        return pictures_in_folder(temporary)
+    if request.get("session"):
+        return pictures_in_session(Path(request["session"]), request.get("captures") or ())
+    return pictures_in_folder(Path(request["pictures"]))
+
+
+@contextmanager
+def _executor(workers: int, pictures: int) -> Iterator[Executor | None]:
+    if workers < 2 or pictures < _WORTH_PROCESSES:
+        yield None
+        return
+    with ProcessPoolExecutor(min(workers, pictures), get_context("spawn")) as executor:
+        yield executor
+
+
+def seen_figures(seen: DetectedPictures) -> JSON:
+    """What was found, in short."""
+    rejected = Counter(r.rule.value for found in seen.detections for r in found.rejections)
+    cameras = {name: {"pictures": 0, "targets": count} for name, count in seen.counts().items()}
+    for picture in seen.pictures:
+        cameras[picture.camera]["pictures"] += 1
+    return {
+        "pictures": len(seen.pictures),
+        "frames": len(seen.observations.frames),
+        "targets": sum(len(found) for found in seen.detections),
+        "cameras": [{"name": name, **facts} for name, facts in cameras.items()],
+        "rejected": [{"rule": rule, "count": count} for rule, count in rejected.most_common()],
+    }
+
+
+def _document(seen: DetectedPictures) -> JSON:
+    return {
+        "schema": "rigwright.detections/1",
+        "pictures": [
+            {
+                "camera": picture.camera,
+                "frame": picture.frame,
+                "image_size_px": list(found.image_size_px),
+                "targets": [
+                    {"id": name, "pixel": pixel, "sigma_px": sigma}
+                    for name, pixel, sigma in zip(
+                        found.ids, found.pixel.tolist(), found.sigma_px.tolist(), strict=True
+                    )
+                ],
+                "rejections": [_rejection(r) for r in found.rejections],
+            }
+            for picture, found in zip(seen.pictures, seen.detections, strict=True)
+        ],
+    }
+
+
+def _rejection(rejection: Rejection) -> JSON:
+    document: JSON = plain(rejection)
+    return document | {"rule": rejection.rule.value}

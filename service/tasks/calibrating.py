@@ -1,0 +1,119 @@
+"""Calibrations, checks and acceptance tests, asked for over HTTP or on the command line.
+
+What all have: the target set as input ``targets``, the pictures as in
+:mod:`service.measuring.seeing`, ``workers`` and ``made_utc`` in the request.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from calibration.targets.files import read_targets
+
+from calibration.acceptance import LengthLimit, Volume, accept, certificate_pdf
+from calibration.acceptance.certificate import Heading
+from calibration.adjustment import CalibratedCamera, CalibrationOptions, ReferencePoses, calibrate
+from calibration.adjustment.options import FIXED, FREE, InteriorModel
+from calibration.check import CheckOptions, check
+from calibration.files import read_calibration, read_check, write_calibration, write_check
+from calibration.files.checkfile import CheckRecord
+from calibration.report import calibration_page, check_page, history_of, history_page
+from rig.designfile import read_design
+from service.measuring.figures import acceptance_figures, calibration_figures, check_figures
+from service.measuring.seeing import DETECTING, see, seen_figures
+from solver.progress import CancelToken, Progress, ProgressCallback
+
+JSON = dict[str, Any]
+Request = Mapping[str, Any]
+Inputs = Mapping[str, Path]
+
+
+def calibration(
+    request: Request, inputs: Inputs, folder: Path, report: ProgressCallback, cancel: CancelToken
+) -> JSON:
+    """Calibrate all cameras; writes ``calibration.json``, ``report.html``, ``detections.json``."""
+    plan = read_targets(inputs["targets"])
+    seen = see(plan, request, inputs, folder, report, cancel)
+    options = _options(request, inputs)
+    done = calibrate(seen.observations, options, _after(report), cancel)
+    name, made = request["name"], request["made_utc"]
+    write_calibration(folder / "calibration.json", done, name, made)
+    _write(folder / "report.html", calibration_page(done, name, made))
+    report(Progress("done", 1.0))
+    return {"detection": seen_figures(seen), **calibration_figures(done)}
+
+
+def _options(request: Request, inputs: Inputs) -> CalibrationOptions:
+    start: tuple[CalibratedCamera, ...] = ()
+    if "design" in inputs:
+        start = tuple(map(CalibratedCamera.from_rig, read_design(inputs["design"]).cameras))
+    sigmas = request.get("poses_known_to")
+    model = dict.fromkeys(request.get("hold") or (), FIXED)
+    model |= dict.fromkeys(request.get("free") or (), FREE)
+    return CalibrationOptions(
+        start=start,
+        model=InteriorModel(**model),
+        reference_poses=None if sigmas is None else ReferencePoses(*sigmas),
+        cross_validate=request.get("cross_validate", True),
+    )
+
+
+def rig_check(
+    request: Request, inputs: Inputs, folder: Path, report: ProgressCallback, cancel: CancelToken
+) -> JSON:
+    """Check a rig against its calibration; writes ``check.json``, ``report.html``.
+
+    With earlier checks (inputs ``check-0``, ``check-1``...) there is a ``history.html`` as well.
+    """
+    reference = read_calibration(inputs["calibration"])
+    seen = see(read_targets(inputs["targets"]), request, inputs, folder, report, cancel)
+    limits = {k: request[k] for k in ("hidden_limit_mm", "tolerance_mm") if request.get(k)}
+    result = check(reference, seen.observations, CheckOptions(**limits), _after(report), cancel)
+    record = CheckRecord(request["reference"], request["made_utc"], result)
+    write_check(folder / "check.json", record)
+    _write(folder / "report.html", check_page(record, reference))
+    earlier = [read_check(path) for role, path in inputs.items() if role.startswith("check-")]
+    if earlier:
+        history = history_of([*earlier, record], request["reference"])
+        _write(folder / "history.html", history_page(history))
+    report(Progress("done", 1.0))
+    return {"detection": seen_figures(seen), **check_figures(result)}
+
+
+def acceptance(
+    request: Request, inputs: Inputs, folder: Path, report: ProgressCallback, cancel: CancelToken
+) -> JSON:
+    """Measure a calibrated bar along several lines; writes ``certificate.pdf``."""
+    reference = read_calibration(inputs["calibration"])
+    seen = see(read_targets(inputs["targets"]), request, inputs, folder, report, cancel)
+    limit, volume = LengthLimit(*request["limit"]), Volume(*request["volume"])
+    done = accept(reference, seen.observations, limit, volume, _after(report), cancel)
+    heading = Heading(
+        rig=request["rig"],
+        calibration=request["reference"],
+        artefact=seen.observations.targets.name,
+        operator=request["operator"],
+        made_utc=request["made_utc"],
+        temperature_degc=request["temperature_degc"],
+    )
+    (folder / "certificate.pdf").write_bytes(certificate_pdf(done, heading))
+    figures = acceptance_figures(done)
+    _write(folder / "acceptance.json", json.dumps(figures, allow_nan=False) + "\n")
+    report(Progress("done", 1.0))
+    return {"detection": seen_figures(seen), **figures}
+
+
+def _after(report: ProgressCallback) -> ProgressCallback:
+    """Progress of what follows detection."""
+
+    def within(inner: Progress, /) -> None:
+        report(Progress(inner.stage, DETECTING + (0.99 - DETECTING) * inner.fraction))
+
+    return within
+
+
+def _write(path: Path, text: str) -> None:
+    path.write_text(text, encoding="utf-8")
