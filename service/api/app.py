@@ -11,7 +11,10 @@ from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 
 from service.api import (
+    acceptances,
+    calibrations,
     captures,
+    checks,
     designs,
     evaluations,
     exports,
@@ -21,6 +24,7 @@ from service.api import (
     root,
     scans,
     sessions,
+    targetsets,
 )
 from service.api.context import Service
 from service.api.errors import install_error_handlers
@@ -48,7 +52,7 @@ def make_app() -> FastAPI:
     resources = (
         *(root, scans, designs, exports, evaluations),
         *(rigs, captures, rigtests, sessions),
-        picturesets,
+        *(targetsets, picturesets, calibrations, checks, acceptances),
     )
     app.state.routers = [module.router for module in resources]
     for router in app.state.routers:

@@ -1,4 +1,4 @@
-"""``/v1/designs/{id}/exports``: a design's cameras for other programs."""
+"""``/v1/designs/{id}/exports``, ``/v1/calibrations/{id}/exports``: cameras for other programs."""
 
 from __future__ import annotations
 
@@ -9,14 +9,18 @@ from typing import Any
 
 from fastapi import APIRouter, Response
 
+from calibration.exports import rig_cameras
+from calibration.files import read_calibration
+from geometry.camera import RigCamera
 from geometry.exchange import FORMATS, export_files
 from rig.designfile import read_design
+from service.api.calibrations import resource as calibrations
 from service.api.context import ServiceDep
-from service.api.designs import resource
+from service.api.designs import resource as designs
 from service.api.models import Model, problems
 
 JSON = dict[str, Any]
-router = APIRouter(tags=["designs"])
+router = APIRouter(tags=["exports"])
 _NO_TIME = (1980, 1, 1, 0, 0, 0)
 """The same design gives the same bytes."""
 
@@ -36,16 +40,32 @@ class ExportList(Model):
     items: list[ExportFormat]
 
 
-@router.get(resource.path + "/{job_id}/exports", response_model=ExportList, responses=problems(404))
+_ZIP = {200: {"description": "The files, as a ZIP archive.", "content": {"application/zip": {}}}}
+
+
+@router.get(designs.path + "/{job_id}/exports", response_model=ExportList, responses=problems(404))
 def list_exports(service: ServiceDep, job_id: str) -> JSON:
     """List the programs a design's cameras can be written for."""
-    service.store.jobs.get(job_id, resource.kind)
+    service.store.jobs.get(job_id, designs.kind)
+    return _formats(f"{designs.path}/{job_id}/exports")
+
+
+@router.get(
+    calibrations.path + "/{job_id}/exports", response_model=ExportList, responses=problems(404)
+)
+def list_calibration_exports(service: ServiceDep, job_id: str) -> JSON:
+    """List the programs calibrated cameras can be written for."""
+    service.store.jobs.get(job_id, calibrations.kind)
+    return _formats(f"{calibrations.path}/{job_id}/exports")
+
+
+def _formats(path: str) -> JSON:
     items = [
         {
             "name": form.name,
             "program": form.program,
             "description": form.description,
-            "href": f"{resource.path}/{job_id}/exports/{form.name}",
+            "href": f"{path}/{form.name}",
         }
         for form in FORMATS.values()
     ]
@@ -53,18 +73,36 @@ def list_exports(service: ServiceDep, job_id: str) -> JSON:
 
 
 @router.get(
-    resource.path + "/{job_id}/exports/{form}",
+    designs.path + "/{job_id}/exports/{form}",
     response_class=Response,
-    responses=problems(404, 409, 503)
-    | {200: {"description": "The files, as a ZIP archive.", "content": {"application/zip": {}}}},
+    responses=problems(404, 409, 503) | _ZIP,
 )
 def read_export(service: ServiceDep, job_id: str, form: str) -> Response:
     """Fetch a design's cameras as one program wants them, in a ZIP archive."""
-    design = resource.file(service, job_id, "design.json")
-    files = export_files(form, read_design(Path(design.path)).cameras)
+    design = designs.file(service, job_id, "design.json")
+    return _zipped(form, read_design(Path(design.path)).cameras)
+
+
+@router.get(
+    calibrations.path + "/{job_id}/exports/{form}",
+    response_class=Response,
+    responses=problems(404, 409, 422, 503) | _ZIP,
+)
+def read_calibration_export(service: ServiceDep, job_id: str, form: str) -> Response:
+    """Fetch calibrated cameras as one program wants them, in a ZIP archive.
+
+    Where the calibration began from a design, pixel pitch and body are the design's.
+    """
+    file = calibrations.file(service, job_id, "calibration.json")
+    built = service.store.jobs.inputs(job_id).get("design")
+    like = () if built is None else read_design(built[1]).cameras
+    return _zipped(form, rig_cameras(read_calibration(Path(file.path)).cameras, like))
+
+
+def _zipped(form: str, cameras: tuple[RigCamera, ...]) -> Response:
     packed = io.BytesIO()
     with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, content in files.items():
+        for name, content in export_files(form, cameras).items():
             archive.writestr(zipfile.ZipInfo(name, _NO_TIME), content)
     headers = {"Content-Disposition": f'attachment; filename="{form}.zip"'}
     return Response(packed.getvalue(), media_type="application/zip", headers=headers)

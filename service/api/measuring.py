@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 from pydantic import Field, model_validator
 
-from geometry.errors import ConflictError, InputError, NotFoundError
+from geometry.errors import ConflictError, NotFoundError
 from rig.session.records import CaptureId
 from rig.session.recovery import read_books
 from rig.session.storage import Disk
@@ -71,7 +71,7 @@ class Detection(Model):
 def picture_source(service: Service, pictures: Pictures) -> tuple[JSON, tuple[JobInput, ...]]:
     """The part of a task's request, and its inputs, that name the pictures.
 
-    Raises :class:`NotFoundError` and :class:`InputError` for what is not there.
+    Raises :class:`NotFoundError` and :class:`~geometry.errors.InputError` for what is not there.
     """
     if pictures.picture_set_id is not None:
         found = service.store.documents.get(PICTURE_SET, pictures.picture_set_id)
@@ -102,8 +102,8 @@ def completed(service: Service, job_id: str, kind: str) -> JobRecord:
     if not job.status.terminal:
         raise ConflictError("job-active", "the job has not ended", "wait until it is completed")
     if job.result is None:
-        raise InputError(
-            f"{kind}-without-result",
+        raise ConflictError(
+            "job-without-result",
             f"the {kind} {job_id!r} has no result ({job.status})",
             f"give a completed {kind}",
         )

@@ -16,10 +16,16 @@ from service.jobs.engine import JobKind, Task
 from service.store.blobs import StagedFile, Staging
 
 _WRITE_BYTES = 1 << 20
+_NOTHING = ("the upload is empty", "send the file's bytes as the body")
+_EMPTY = {
+    "scan": InputError("scan-empty", *_NOTHING),
+    "pictures": InputError("pictures-empty", *_NOTHING),
+}
+_SETTINGS = {"scan": "MAX_UPLOAD_BYTES", "pictures": "MAX_PICTURES_BYTES"}
 
 
 async def receive(request: Request, staging: Staging, limit: int, what: str) -> StagedFile:
-    """Write the body into ``staging``; ``what`` is being uploaded, for the errors.
+    """Write the body into ``staging``; ``what``, ``scan`` or ``pictures``, is uploaded.
 
     Raises :class:`TooLargeError` beyond ``limit`` bytes, before the body when it is announced,
     and :class:`InputError` for an empty or broken upload.
@@ -42,19 +48,16 @@ async def receive(request: Request, staging: Staging, limit: int, what: str) -> 
             "upload-truncated", "the upload broke off", "send the whole file again"
         ) from None
     if received == 0:
-        raise InputError(
-            f"{what}-empty", "the upload is empty", "send the file's bytes as the body"
-        )
+        raise _EMPTY[what]
     await to_thread.run_sync(staging.write, bytes(waiting))
     return await to_thread.run_sync(staging.finish)
 
 
 def _too_large(limit: int, what: str) -> TooLargeError:
-    setting = "UPLOAD" if what == "scan" else what.upper()
     return TooLargeError(
         "upload",
         f"the file is larger than the {limit / (1 << 20):.0f} MiB that are accepted",
-        f"send less, or raise RIGWRIGHT_MAX_{setting}_BYTES",
+        f"send less, or raise RIGWRIGHT_{_SETTINGS[what]}",
     )
 
 

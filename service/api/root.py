@@ -20,7 +20,7 @@ _LITTLE_DISK_BYTES = 1 << 30
 _RESOURCES = (
     *("health", "scans", "designs", "evaluations"),
     *("rigs", "captures", "rig-tests", "sessions"),
-    "picture-sets",
+    *("target-sets", "picture-sets", "calibrations", "checks", "acceptances"),
 )
 
 

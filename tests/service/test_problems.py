@@ -10,6 +10,7 @@ from service_helpers import ROOT
 from starlette.testclient import TestClient
 
 from geometry import errors
+from service.api import picturesets, targetsets
 from service.api.app import make_app
 from service.kinds import KINDS as JOB_KINDS
 from service.logs import JsonLines, job_id
@@ -187,15 +188,23 @@ def test_the_guide_lists_every_error() -> None:
 def test_the_guide_lists_no_error_that_cannot_come() -> None:
     listed = set(re.findall(r"`((?:" + "|".join(KINDS) + r")/[a-z-]+)`", GUIDE))
     framework = {f"{kind}/{detail}" for kind, detail, _ in HTTP_ERRORS.values()}
-    of_job_kinds = {f"not-found/{kind}" for kind in (*JOB_KINDS, *RIG_KINDS)}
-    of_rigs = codes_in_the_code("rig")
+    stored = (*JOB_KINDS, *RIG_KINDS, targetsets.KIND, picturesets.KIND)
+    of_job_kinds = {f"not-found/{kind}" for kind in stored}
+    of_rigs = codes_in_the_code("rig") | codes_in_the_code("calibration")
     assert listed - codes_in_the_code() - of_rigs - framework - of_job_kinds == set()
+
+
+LIKE_DESIGNS = tuple(
+    f"/v1/{name}/{{id}}/"
+    for name in ("captures", "rig-tests", "evaluations", "calibrations", "checks", "acceptances")
+)
+"""What is below these is said to be as it is below designs."""
 
 
 def test_the_guide_lists_every_setting_and_path() -> None:
     for name in Settings.model_fields:
         assert f"`{PREFIX}{name.upper()}`" in GUIDE
     for path in make_app().openapi()["paths"]:
-        shown = path.replace("{scan_id}", "{id}").replace("{job_id}", "{id}")
-        if not shown.startswith(("/v1/evaluations/", "/v1/captures/{id}/", "/v1/rig-tests/{id}/")):
-            assert shown in GUIDE or shown.removeprefix("/v1/designs/{id}") in GUIDE, shown
+        shown = re.sub(r"{(scan|job|target_set|picture_set)_id}", "{id}", path)
+        if not shown.startswith(LIKE_DESIGNS):
+            assert shown in GUIDE or re.sub(r"^/v1/[a-z-]+/{id}", "\u2026", shown) in GUIDE, shown
