@@ -100,6 +100,7 @@ class Worker:
         self._fetching = threading.Event()
         self._arm_number = 0
         self._armed = False
+        self._over = False
 
     def run(self, source: BinaryIO) -> None:
         """Serve until the host says ``close`` or is gone."""
@@ -108,8 +109,12 @@ class Worker:
         while (command := self._commands.get()) is not None:
             self._answer(command)
             if command.get("do") == "close":
-                return
-        self._let_go()
+                break
+        else:
+            self._let_go()
+        with self._writing:
+            # A picture may be on its way still, and who listened has hung up.
+            self._over = True
 
     def _listen(self, source: BinaryIO) -> None:
         with contextlib.suppress(wire.WireError, OSError):
@@ -120,7 +125,8 @@ class Worker:
 
     def _say(self, header: Mapping[str, object], payload: bytes = b"") -> None:
         with self._writing, contextlib.suppress(OSError):
-            wire.send(self._out, header, payload)
+            if not self._over:
+                wire.send(self._out, header, payload)
 
     def _answer(self, command: wire.Header) -> None:
         number = command.get("n")
