@@ -97,9 +97,11 @@ def diagnose(
         better = [*accepted, chosen]
         if not suspects:
             better = _best_cameras(better, tests, first)
-        if better[:-1] == accepted:
-            near = _size_px(epoch, last, chosen) < LARGE_PX
-            last = refit(epoch, last, _together([chosen], last), near)
+        if _size_px(epoch, last, chosen) > LARGE_PX:
+            # The last fit bent the reference to what it did not know of: start without it.
+            last = fit_with(epoch, state, better)
+        elif better[:-1] == accepted:
+            last = refit(epoch, last, _together([chosen], last), near=True)
         else:
             same = len(first.v) == len(epoch.pixel)
             last = refit(epoch, first, _together(better, first), near=same)
