@@ -15,7 +15,7 @@ from calibration.adjustment.start.resection import placed_candidates
 from calibration.adjustment.state import State
 from calibration.check.epoch import Epoch
 from calibration.check.linear import sight_of
-from geometry.arrays import Floats, Ints
+from geometry.arrays import Bools, Floats, Ints
 
 ROUNDS = 6
 LEAST_FOR_RESECTION = 4
@@ -36,25 +36,29 @@ class Consensus:
     scale: Floats
 
 
-def consensus(epoch: Epoch, assigned: Ints | None = None) -> Consensus:
+def consensus(epoch: Epoch, assigned: Ints | None = None, among: Ints | None = None) -> Consensus:
     """Carriers placed by intersected targets, with little weight on rays that miss.
 
     ``assigned`` (n,): which reference camera took each camera's images, when not its own.
+    ``among``: the cameras that are listened to, when not all.
     """
     reference, camera = epoch.reference, epoch.camera
     used = camera if assigned is None else assigned[camera]
     origins, ways = _rays(epoch, used)
     focal = reference.interior[used, 0]
     places, targets = len(epoch.place_carrier), len(epoch.target_names)
-    weights = np.ones(len(used))
+    heard = np.ones(len(used)) if among is None else np.isin(camera, among).astype(np.float64)
+    weights = heard
     for _ in range(ROUNDS):
         points = nearest_points(origins, ways, epoch.points, places * targets, weights)
         off = _miss_px(points[epoch.points] - origins, ways, focal)
         # Weights that fall with the distance make it the least sum of distances, not of squares.
-        weights = 1.0 / np.maximum(np.nan_to_num(off, nan=1e6), FLOOR_PX)
+        weights = heard / np.maximum(np.nan_to_num(off, nan=1e6), FLOOR_PX)
     found = points.reshape(places, targets, 3)
     placed = [
-        _placed(epoch, found, k) or _resected(epoch, used, k) or (np.nan, np.eye(3), np.zeros(3))
+        _placed(epoch, found, k)
+        or _resected(epoch, used, heard, k)
+        or (np.nan, np.eye(3), np.zeros(3))
         for k in range(places)
     ]
     position = np.stack([p[2] for p in placed])[epoch.view_place]
@@ -96,9 +100,10 @@ def _miss_px(arms: Floats, ways: Floats, focal_px: Floats) -> Floats:
 _Placed = tuple[float, Floats, Floats]
 
 
-def _resected(epoch: Epoch, used: Ints, place: int) -> _Placed | None:
+def _resected(epoch: Epoch, used: Ints, heard: Floats, place: int) -> _Placed | None:
     """Attitude and position of a carrier that one camera alone saw, by resection."""
     rows = np.flatnonzero(epoch.place == place)
+    rows = rows[heard[rows] > 0.0] if (heard[rows] > 0.0).any() else rows
     camera = int(np.bincount(used[rows]).argmax())
     own = rows[used[rows] == camera]
     reference = epoch.reference
@@ -140,12 +145,13 @@ def misfit_px(epoch: Epoch, state: State) -> Floats:
     return np.where(depth > 0.0, np.linalg.norm(epoch.pixel - pixel, axis=1), 1e6)
 
 
-def by_camera(epoch: Epoch, off: Floats) -> Floats:
-    """Median misfit (n,) of each camera; 0 for those that saw nothing."""
-    count = len(epoch.camera_names)
-    return np.array(
-        [
-            np.median(off[epoch.camera == k]) if (epoch.camera == k).any() else 0.0
-            for k in range(count)
-        ]
-    )
+def by_camera(epoch: Epoch, off: Floats, told: Bools | None = None) -> Floats:
+    """Median misfit (n,) of each camera; 0 for those that saw nothing.
+
+    ``told`` (rows,): the image points that count, when not all.
+    """
+    counted = np.ones(len(off), bool) if told is None else told
+    out = np.zeros(len(epoch.camera_names))
+    for k in np.unique(epoch.camera[counted]):
+        out[k] = np.median(off[counted & (epoch.camera == k)])
+    return out

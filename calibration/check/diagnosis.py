@@ -16,9 +16,10 @@ from scipy.stats import chi2
 from calibration.adjustment.state import State
 from calibration.check.epoch import Epoch
 from calibration.check.fit import Fit, again, fit, refit
-from calibration.check.hypotheses import ALPHA, Cause, Hypothesis, hypotheses, log_tail
-from calibration.check.linear import Columns, Linear
+from calibration.check.hypotheses import Cause, Hypothesis, hypotheses, log_tail
+from calibration.check.linear import Linear
 from calibration.check.scores import Outcomes, ScoreTests, estimate
+from calibration.check.suspects import convicted, fit_with, is_lens
 from geometry.arrays import Bools, Floats, Ints
 
 MOST_CAUSES = 16
@@ -84,8 +85,8 @@ def diagnose(
     outcomes = tests.run(first.score)
     last, accepted, present, current = first, [], outcomes, tests
     if suspects:
-        accepted = _suspected(epoch, state, tests, suspects)
-        last = _full(epoch, state, accepted)
+        accepted = convicted(epoch, state, tests.hypotheses, suspects)
+        last = fit_with(epoch, state, accepted)
         epoch, last, lost = _cleaned(epoch, last)
         current = ScoreTests(tests.hypotheses, last.linear)
         present = current.run(last.score)
@@ -93,10 +94,14 @@ def diagnose(
         chosen = _chosen(epoch, last, current, present)
         if chosen in accepted:
             break  # free already and still failing: no cause that is known here explains the rest
-        better = _best_cameras([*accepted, chosen], tests, first)
-        if better[:-1] == accepted:
-            near = _size_px(epoch, last, chosen) < LARGE_PX
-            last = refit(epoch, last, _together([chosen], last), near)
+        better = [*accepted, chosen]
+        if not suspects:
+            better = _best_cameras(better, tests, first)
+        if _size_px(epoch, last, chosen) > LARGE_PX:
+            # The last fit bent the reference to what it did not know of: start without it.
+            last = fit_with(epoch, state, better)
+        elif better[:-1] == accepted:
+            last = refit(epoch, last, _together([chosen], last), near=True)
         else:
             same = len(first.v) == len(epoch.pixel)
             last = refit(epoch, first, _together(better, first), near=same)
@@ -104,38 +109,6 @@ def diagnose(
         current = ScoreTests(tests.hypotheses, last.linear)
         present = current.run(last.score)
     return Diagnosis(epoch, first, tests, outcomes, tuple(accepted), last, lost)
-
-
-def _full(epoch: Epoch, state: State, causes: list[Hypothesis]) -> Fit:
-    """A fit with causes free from the beginning."""
-    base = Columns.of(epoch).count
-    freed = np.concatenate([h.directions(base) for h in causes], axis=1)
-    return fit(epoch, state, Linear(epoch, state, freed))
-
-
-def _suspected(
-    epoch: Epoch, state: State, tests: ScoreTests, suspects: tuple[int, ...]
-) -> list[Hypothesis]:
-    """For each suspected camera whether it moved or its lens changed."""
-    own = {(h.cause, h.subject): h for h in tests.hypotheses}
-    both = {c: [own[Cause.POSE, c], own[Cause.LENS, c]] for c in suspects}
-    everything = _full(epoch, state, [h for pair in both.values() for h in pair])
-    out = []
-    for camera, (pose, lens) in both.items():
-        others = [h for c, pair in both.items() for h in pair if c != camera]
-        by_pose = -_full(epoch, state, [pose, *others]).chi2
-        by_lens = -_full(epoch, state, [lens, *others]).chi2
-        out.append(lens if _is_lens(by_pose, by_lens, -everything.chi2) else pose)
-    return out
-
-
-def _is_lens(by_pose: float, by_lens: float, by_both: float) -> bool:
-    """Whether the lens is to blame rather than the camera's place.
-
-    Through a long lens a turn and a shift of the principal point look alike, so the lens is
-    blamed only when a movement does not explain the images and a change of the lens does.
-    """
-    return log_tail(by_both - by_pose, 3) < np.log(ALPHA) and by_lens > by_pose
 
 
 def _together(causes: list[Hypothesis], last: Fit) -> Floats:
@@ -219,7 +192,7 @@ def _pose_or_lens(epoch: Epoch, last: Fit, tests: ScoreTests, camera: int) -> Hy
         gains = [_gain(epoch, last, s) for s in sets]
     else:
         gains = [_statistic(s, last) for s in sets]
-    return lens if _is_lens(*gains) else pose
+    return lens if is_lens(*gains) else pose
 
 
 def _statistic(causes: list[Hypothesis], last: Fit) -> float:

@@ -18,8 +18,11 @@ TOLERANCE = 1e-4
 FAR_PX = 0.5
 """A state this far from where the model was made needs a new model."""
 
+NEAR_PX = 0.02
+"""Once models are made anew, they are until the state moves less than this from its own."""
+
 MOST_STEPS = 12
-MOST_MODELS = 6
+MOST_MODELS = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,11 +80,11 @@ def again(epoch: Epoch, last: Fit) -> Fit:
 
 def _settled(epoch: Epoch, state: State, unknowns: Floats, model: Linear) -> Fit:
     """New models about new states until the state stays near its model."""
-    done = _with_model(epoch, state, unknowns, model)
+    done, enough_px = _with_model(epoch, state, unknowns, model), FAR_PX
     for _ in range(MOST_MODELS):
-        if _change_px(epoch, state, done.state) < FAR_PX:
+        if _change_px(epoch, state, done.state) < enough_px:
             break
-        state = done.state
+        state, enough_px = done.state, NEAR_PX
         done = _with_model(epoch, state, done.unknowns, Linear(epoch, state, model.freed))
     return done
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
+from calibration.check.agreement import agreeing
 from calibration.check.consensus import Consensus, by_camera, consensus, misfit_px
 from calibration.check.epoch import Epoch
 from geometry.arrays import Bools, Floats, Ints
@@ -54,7 +55,8 @@ def put_right(epoch: Epoch) -> Righted:
     if cameras:
         epoch = _reassigned(epoch, assigned)
         start = consensus(epoch)
-    scales = _scales(epoch, start)
+    # A camera that is far off would bend the sizes of everything.
+    scales = _scales(epoch, agreeing(epoch, start)[0])
     for carrier, scale in scales:
         epoch = _resized(epoch, carrier, scale)
     start = consensus(epoch) if scales else start
@@ -62,8 +64,7 @@ def put_right(epoch: Epoch) -> Righted:
     if ids:
         epoch = _relabelled(epoch, ids)
         start = consensus(epoch)
-    off = by_camera(epoch, misfit_px(epoch, start.state)) > BAD_PX
-    suspects = tuple(int(k) for k in np.flatnonzero(off)) if 2 * off.sum() < len(off) else ()
+    start, suspects = agreeing(epoch, start)
     return Righted(epoch, start, suspects, cameras, ids, scales)
 
 
