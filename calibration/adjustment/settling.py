@@ -14,11 +14,20 @@ from calibration.adjustment.options import CalibrationOptions
 from calibration.adjustment.reliability import Reliability
 from geometry.arrays import Bools, Floats
 
+LEAST_SIGMA_PX = 0.01
+"""Residuals may make stated sigmas smaller, but not below this: what fits to a few thousandths of
+a pixel is still pulled by paper, light and optics, differently in each picture. Tests with
+smaller sigmas would raise alarms about nothing that matters."""
+
 LATE = 2.5
 LEAST_VIEWS = 5
 LEAST_IN_VIEW = 4
 """A view (one camera, one place of a carrier) is late when half its points are off by more than
-this many times what is usual for the camera: nothing in the picture is wrong, but its moment."""
+this many times what is usual, for the camera and for its sigmas: nothing in the picture is wrong,
+but its moment."""
+
+_USUAL = float(np.sqrt(2.0 * np.log(2.0)))
+"""Median length of a residual in sigmas: two degrees of freedom."""
 
 BLUNDER_CHANCE = 0.01
 """Chance that a set of good observations loses one of them to the test."""
@@ -56,8 +65,18 @@ def settle(
     good = np.where(bad, 0.0, 1.0)
     whole, *each = image_components(replace(solution, weights=good), network, _kept(found, ~bad))
     if bad.any() or not equal:
-        return bad, np.full(count, whole.factor if whole.significant else 1.0)
-    return bad, _own_factors(each)
+        change = np.full(count, whole.factor if whole.significant else 1.0)
+    else:
+        change = _own_factors(each)
+    return bad, np.maximum(change, _least_factors(network))
+
+
+def _least_factors(network: Network) -> Floats:
+    """How much smaller the sigmas in use may become, (cameras,)."""
+    rows = network.camera_rows
+    own = [network.sigma_px[rows[k] : rows[k + 1]] for k in range(network.camera_count)]
+    usual = np.array([np.median(sigmas) if sigmas.size else LEAST_SIGMA_PX for sigmas in own])
+    return np.minimum(1.0, LEAST_SIGMA_PX / usual)
 
 
 def _own_factors(each: list[Component]) -> Floats:
@@ -95,7 +114,7 @@ def late_points(solution: Solution, network: Network) -> Bools:
     for c in range(network.camera_count):
         own = camera == c
         if own.sum() >= LEAST_VIEWS:
-            late[own] = middle[own] > LATE * np.median(middle[own])
+            late[own] = middle[own] > LATE * max(float(np.median(middle[own])), _USUAL)
     worst = np.zeros(network.pose_count)
     np.maximum.at(worst, place, middle)
     late &= (counts >= LEAST_IN_VIEW) & (middle >= worst[place])

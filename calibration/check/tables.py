@@ -28,6 +28,11 @@ LEAST_POINTS = 8
 MAD = 1.4826
 
 
+RAISED = 1.5
+"""Light, distance and tilt of the targets alone make one day's pictures this much noisier than
+another's. It costs accuracy, not truth: less is not worth a word."""
+
+
 @dataclass(frozen=True, eq=False)
 class Noise:
     """Scatter of each camera's image points against the stated one: ``factor``, ``p`` (n,)."""
@@ -36,8 +41,8 @@ class Noise:
     p: Floats
 
     def raised(self) -> Bools:
-        """Which cameras scatter more than chance allows, (n,)."""
-        return self.p < ALPHA * NOISE_SHARE / len(self.p)
+        """Which cameras scatter more than chance allows, and enough to matter, (n,)."""
+        return np.asarray((self.p < ALPHA * NOISE_SHARE / len(self.p)) & (self.factor > RAISED))
 
 
 def noise_of(diagnosis: Diagnosis) -> Noise:
