@@ -55,6 +55,7 @@ def test_wrong_shapes_are_refused() -> None:
         intersect(rig(3), np.zeros((2, 4, 2)), np.ones((3, 4), bool))
 
 
+@pytest.mark.slow
 def test_predicted_covariance_agrees_with_monte_carlo() -> None:
     subject = rigs.face(60, 60)
     cameras = rig(6)

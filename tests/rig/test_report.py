@@ -257,6 +257,7 @@ def test_a_browser_draws_it(
 
 
 @pytest.mark.needs_browser
+@pytest.mark.slow
 def test_dark_and_narrow(page: str, browser: Browser, tmp_path: Path) -> None:
     path = tmp_path / "report.html"
     path.write_text(page, encoding="utf-8")
@@ -284,6 +285,7 @@ def test_the_ellipsoid_figures_turn_together(page: str, browser: Browser, tmp_pa
 
 
 @pytest.mark.needs_browser
+@pytest.mark.slow
 def test_hostile_names_do_nothing(
     hostile_design: Design, subject: Subject, browser: Browser, tmp_path: Path
 ) -> None:

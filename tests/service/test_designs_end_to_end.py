@@ -233,6 +233,7 @@ class TestOverHttp:
         assert job["result"]["cost_mm2"] > completed["result"]["cost_mm2"]
 
 
+@pytest.mark.slow
 def test_a_long_design_leaves_the_service_quick_and_stops_within_a_second(
     start_server: StartServer, head: Path, small_rig: JSON
 ) -> None:

@@ -193,6 +193,7 @@ class TestEvents:
 
 
 class TestDurability:
+    @pytest.mark.slow
     def test_kill_nine_during_jobs_loses_nothing_that_was_finished(
         self, start_server: StartServer, tmp_path: Path
     ) -> None:
@@ -229,6 +230,7 @@ class TestDurability:
             # One file per distinct content: nothing lost, nothing left over.
             assert len(files_under(data / "blobs")) == len(set(done.values()))
 
+    @pytest.mark.slow
     def test_a_job_that_waited_is_done_after_a_crash(
         self, start_server: StartServer, tmp_path: Path
     ) -> None:

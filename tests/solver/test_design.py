@@ -77,6 +77,7 @@ def test_result_carries_its_evidence() -> None:
     assert found.quality.cost_mm2 == pytest.approx(norm.mean(), rel=1e-12)
 
 
+@pytest.mark.slow
 def test_same_seed_same_bits_whatever_the_workers() -> None:
     one, two = standard(workers=1), standard(workers=2)
     for a, b in zip(one.cameras, two.cameras, strict=True):
@@ -85,6 +86,7 @@ def test_same_seed_same_bits_whatever_the_workers() -> None:
         assert a.focus_distance_mm == b.focus_distance_mm
 
 
+@pytest.mark.slow
 def test_another_seed_explores_elsewhere() -> None:
     first = standard().cameras[0].pose.position_rig_mm
     assert not np.array_equal(first, standard(seed=5).cameras[0].pose.position_rig_mm)

@@ -10,6 +10,7 @@ from benchmarks.crashes import run
 
 
 @pytest.mark.parametrize(("times", "seed"), [(30, 1), pytest.param(200, 2, marks=pytest.mark.slow)])
+@pytest.mark.slow
 def test_killed_at_random_nothing_committed_is_lost(tmp_path: Path, times: int, seed: int) -> None:
     tally = run(times, seed, tmp_path)
     assert not tally.wrong

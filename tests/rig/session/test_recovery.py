@@ -68,6 +68,7 @@ def steps(tmp_path_factory: pytest.TempPathFactory) -> int:
     return count
 
 
+@pytest.mark.slow
 def test_a_power_cut_at_every_step(bench: BenchMaker, steps: int) -> None:
     """One rig, one session per step: the second capture is cut short at that step."""
     fates = set()

@@ -104,6 +104,7 @@ def test_layers_agree_with_a_thin_lens() -> None:
     assert error < left_out / 6.0
 
 
+@pytest.mark.slow
 def test_a_backdrop_does_not_shine_through_the_face() -> None:
     bright = replace(
         SceneSettings(head=HeadSettings(subdivisions=0, grain_contrast=0.0)),

@@ -144,6 +144,7 @@ def test_files_that_cannot_be_used_are_named(tmp_path: Path, ball: HeadSettings)
 
 @real_scan
 @needs_scan
+@pytest.mark.slow
 def test_the_real_scan_is_closed_and_stands_where_the_design_has_it() -> None:
     settings = real_head(subdivisions=0)
     mesh, scan = head_mesh(settings), read_scan(SCANS / "LeePerrySmith.glb")

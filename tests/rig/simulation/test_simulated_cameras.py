@@ -132,6 +132,7 @@ def test_a_burst_gives_its_frames_in_order_with_counters_and_times(backend_of: M
         assert np.abs(np.diff(stamps) - 40_000_000).max() < 1000 + 40_000_000 * 2e-5
 
 
+@pytest.mark.slow
 def test_slow_rendering_makes_no_frame_late_and_loses_none(backend_of: Maker) -> None:
     """The caller's own clock has run out when the first picture is there; all are handed over."""
     # A light that no other test has, so that its shadows are still to be found.
