@@ -94,9 +94,8 @@ def parsed(model: type[ModelT], text: str | bytes, source: str) -> ModelT:
 
 
 def _one_line(error: ValidationError, model: type[BaseModel], source: str) -> InputError:
-    """The most telling finding: another kind of file first, then a misspelt key, which makes
-    another seem missing.
-    """
+    """The most telling finding: another kind of file, then a misspelt key, then the rest."""
+    # A misspelt key makes another seem missing, and another kind of file misspells them all.
     found = sorted(
         error.errors(), key=lambda e: (e["loc"] != ("schema",), e["type"] != "extra_forbidden")
     )
