@@ -1,6 +1,25 @@
-"""Files of the calibration floor: strict at the edge, lossless, written whole or not at all."""
+"""Files of the calibration floor: strict at the edge, lossless, written whole or not at all.
 
-from calibration.files.calibrationfile import SCHEMA, read_calibration, write_calibration
-from calibration.files.checkfile import read_check, write_check
+``CHECKS`` and ``ACCEPTANCES`` write, read and parse one record each.
+"""
 
-__all__ = ["SCHEMA", "read_calibration", "read_check", "write_calibration", "write_check"]
+from calibration.files.calibrationfile import (
+    CalibrationRecord,
+    calibration_document,
+    calibration_from,
+    read_calibration,
+    write_calibration,
+)
+from calibration.files.records import ACCEPTANCES, CHECKS, AcceptanceRecord, CheckRecord
+
+__all__ = [
+    "ACCEPTANCES",
+    "AcceptanceRecord",
+    "CHECKS",
+    "CalibrationRecord",
+    "CheckRecord",
+    "calibration_document",
+    "calibration_from",
+    "read_calibration",
+    "write_calibration",
+]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -100,14 +101,22 @@ class CalibrationModel(StrictModel):
     model_config = StrictModel.model_config | {"alias_generator": lambda n: n.removesuffix("_")}
 
 
-def calibration_document(
-    calibration: Calibration, name: str = "", made_utc: str = ""
-) -> dict[str, Any]:
-    """The file as plain data. ``made_utc`` is a time as text, given by the caller."""
+@dataclass(frozen=True, eq=False)
+class CalibrationRecord:
+    """A calibration with its name and the time it was made, UTC as text (ISO 8601)."""
+
+    name: str
+    made_utc: str
+    calibration: Calibration
+
+
+def calibration_document(record: CalibrationRecord) -> dict[str, Any]:
+    """The file as plain data."""
+    calibration = record.calibration
     return {
         "schema": SCHEMA,
-        "name": name,
-        "made_utc": made_utc,
+        "name": record.name,
+        "made_utc": record.made_utc,
         "datum": calibration.datum,
         "cameras": [
             _camera(c, float(f))
@@ -170,7 +179,7 @@ def _dense(rows: list[list[float | None]], missing: float) -> Floats:
     return np.array(table, np.float64).reshape(-1, 3)
 
 
-def calibration_from(text: str | bytes, source: str) -> tuple[Calibration, CalibrationModel]:
+def calibration_from(text: str | bytes, source: str) -> CalibrationRecord:
     """A calibration from a file's text; raises a one-line :class:`InputError`."""
     model = parsed(CalibrationModel, text, source)
     targets = TargetSet(
@@ -191,7 +200,7 @@ def calibration_from(text: str | bytes, source: str) -> tuple[Calibration, Calib
     )
     _must_agree(model, targets, source)
     covariance = unpacked(model.covariance, len(model.cameras), len(targets.ids), source)
-    return Calibration(
+    calibration = Calibration(
         tuple(_camera_of(c) for c in model.cameras),
         targets,
         _dense(model.target_mm, np.nan),
@@ -208,7 +217,8 @@ def calibration_from(text: str | bytes, source: str) -> tuple[Calibration, Calib
         np.array([c.sigma_factor for c in model.cameras]),
         model.datum,
         record_of(CalibrationQuality, model.quality),
-    ), model
+    )
+    return CalibrationRecord(model.name, model.made_utc, calibration)
 
 
 def _camera_of(model: CameraModel) -> CalibratedCamera:
@@ -239,19 +249,12 @@ def _must_agree(model: CalibrationModel, targets: TargetSet, source: str) -> Non
         )
 
 
-def write_calibration(
-    path: Path,
-    calibration: Calibration,
-    name: str = "",
-    made_utc: str = "",
-    overwrite: bool = False,
-) -> None:
+def write_calibration(path: Path, record: CalibrationRecord, overwrite: bool = False) -> None:
     """Writes ``calibration.json``, whole or not at all."""
-    document = calibration_document(calibration, name, made_utc)
-    text = json.dumps(document, allow_nan=False, ensure_ascii=False) + "\n"
+    text = json.dumps(calibration_document(record), allow_nan=False, ensure_ascii=False) + "\n"
     write_whole(path, text.encode(), overwrite)
 
 
-def read_calibration(path: Path) -> Calibration:
+def read_calibration(path: Path) -> CalibrationRecord:
     """Reads ``calibration.json``; raises a one-line :class:`InputError`."""
-    return calibration_from(read_limited(path), path.name)[0]
+    return calibration_from(read_limited(path), path.name)

@@ -24,7 +24,6 @@ class StrictModel(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
 
 
-@functools.cache
 def model_of(record: type) -> type[StrictModel]:
     """The strict model with the fields of a dataclass. Numbers that are not finite are null."""
     hints = get_type_hints(record)
@@ -95,8 +94,11 @@ def parsed(model: type[ModelT], text: str | bytes, source: str) -> ModelT:
 
 
 def _one_line(error: ValidationError, model: type[BaseModel], source: str) -> InputError:
-    """The most telling finding; a misspelt key first, since it makes another seem missing."""
-    found = sorted(error.errors(), key=lambda e: e["type"] != "extra_forbidden")
+    """The most telling finding: another kind of file, then a misspelt key, then the rest."""
+    # A misspelt key makes another seem missing, and another kind of file misspells them all.
+    found = sorted(
+        error.errors(), key=lambda e: (e["loc"] != ("schema",), e["type"] != "extra_forbidden")
+    )
     first, more = found[0], f" ({len(found) - 1} more after it)" if len(found) > 1 else ""
     where = ".".join(str(part) for part in first["loc"]) or "the file"
     if first["type"] == "json_invalid":

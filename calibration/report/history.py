@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from calibration.files.checkfile import CheckRecord
+from calibration.files.records import CheckRecord
 from calibration.report.svg import Series, chart
 
 

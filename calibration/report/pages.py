@@ -7,7 +7,8 @@ from html import escape
 
 from calibration.adjustment.result import Calibration
 from calibration.check.verdicts import CameraCheck, CheckResult, Kind, Light
-from calibration.files.checkfile import CheckRecord
+from calibration.files.calibrationfile import CalibrationRecord
+from calibration.files.records import CheckRecord
 from calibration.report.history import History, history_svg
 from calibration.report.svg import GREEN, RED, YELLOW, Series, chart, residual_plot
 
@@ -181,8 +182,9 @@ def _residuals(cameras: tuple[CameraCheck, ...], reference: Calibration) -> str:
     return f'<div class="plots">{"".join(plots)}</div>'
 
 
-def calibration_page(calibration: Calibration, name: str = "", made_utc: str = "") -> str:
+def calibration_page(record: CalibrationRecord) -> str:
     """A calibration: how good it is, camera by camera, and what to know of it."""
+    calibration, name, made_utc = record.calibration, record.name, record.made_utc
     quality = calibration.quality
     colour = Light.GREEN if quality.converged and not quality.warnings else Light.YELLOW
     told = "Calibrated" if quality.converged else f"Not converged ({quality.stop.value})"

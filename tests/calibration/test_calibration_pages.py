@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from calibration.check import CheckOptions, CheckResult, check
-from calibration.files.checkfile import CheckRecord
+from calibration.files import CalibrationRecord, CheckRecord
 from calibration.report import (
     calibration_page,
     check_page,
@@ -75,7 +75,7 @@ def test_the_check_page_says_it_in_words_numbers_and_pictures() -> None:
 
 
 def test_the_calibration_page_has_all_cameras() -> None:
-    page = calibration_page(calibrations.small_reference(), NASTY, "2026-11-22")
+    page = calibration_page(CalibrationRecord(NASTY, "2026-11-22", calibrations.small_reference()))
     reader = parsed(page)
     assert all(f"<td>cam{k}</td>" in page for k in range(1, 6))
     assert reader.seen.count("svg") == 5
