@@ -9,7 +9,7 @@ from calibration.detection.found import Finding
 from calibration.detection.gates import Gates
 from calibration.detection.images import Picture
 from calibration.detection.opencv import Markers
-from calibration.detection.plates import LAYOUT_AGREEMENT, agreeing, plane_markers
+from calibration.detection.plates import LAYOUT_AGREEMENT, agreeing, believable, plane_markers
 from calibration.detection.rings import mirrored_codes, ring_dots
 from calibration.detection.seeing import Sight
 from calibration.targets.kinds import (
@@ -55,7 +55,7 @@ def plate_layout(sight: Sight, plate: CharucoPlate) -> Finding | None:
     """Whether the markers seen lie as on another plate than the one described."""
     markers = sight.markers(plate.dictionary, (plate,))
     own, _ = plane_markers(plate, markers)
-    if len(own) < _ENOUGH_MARKERS or agreeing(plate, markers).mean() >= LAYOUT_AGREEMENT:
+    if len(own) < _ENOUGH_MARKERS or believable(plate, markers):
         return None
     return other_layout(plate, markers)
 

@@ -215,13 +215,19 @@ def video_frames(path: Path) -> Iterator[Bytes]:
 
 
 def sampled(grey: Bytes, places_px: Floats) -> Floats:
-    """Grey levels (n, m) between pixels at places (n, m, 2); outside the picture black."""
+    """Grey levels (n, m) at places (n, m, 2) between pixels; outside the picture its border's."""
     x, y = (np.ascontiguousarray(places_px[..., k], dtype=np.float32) for k in range(2))
     if x.size == 0:
         return np.zeros(x.shape)
     # OpenCV takes at most 32767 rows of places.
     parts = [
-        cv2.remap(grey, x[k : k + 30000], y[k : k + 30000], cv2.INTER_LINEAR)
+        cv2.remap(
+            grey,
+            x[k : k + 30000],
+            y[k : k + 30000],
+            cv2.INTER_LINEAR,
+            borderMode=cv2.BORDER_REPLICATE,
+        )
         for k in range(0, len(x), 30000)
     ]
     return np.concatenate(parts).astype(np.float64)
