@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from calibration.detection import opencv
 from calibration.detection.found import Finding
 from calibration.detection.gates import Gates
 from calibration.detection.images import Picture
 from calibration.detection.opencv import Markers
-from calibration.detection.plates import LAYOUT_AGREEMENT, agreeing, plane_markers
+from calibration.detection.plates import LAYOUT_AGREEMENT, agreeing, believable, plane_markers
 from calibration.detection.rings import mirrored_codes, ring_dots
+from calibration.detection.seeing import Sight
 from calibration.targets.kinds import (
     CharucoPlate,
     MarkerCarrier,
@@ -23,33 +26,36 @@ _FEW = 8
 """Some codes look the same in a mirror: a few targets can be found in a mirrored picture."""
 
 
-def diagnose(picture: Picture, plan: TargetPlan, gates: Gates, found: int) -> tuple[Finding, ...]:
+def diagnose(
+    sights: Mapping[bool, Sight], plan: TargetPlan, gates: Gates, found: int
+) -> tuple[Finding, ...]:
     """What explains that a plate, or all targets, are missing; empty when nothing does.
 
+    ``sights`` are the picture, and its negative for targets with black and white exchanged;
     ``found`` is how many targets were found. Plates whose markers lie otherwise than they should
     are reported in any case; the slower questions are asked only when nothing was found.
     """
     findings = [
         finding
         for plate in plan.carriers
-        if isinstance(plate, CharucoPlate) and (finding := plate_layout(picture, plate)) is not None
+        if isinstance(plate, CharucoPlate)
+        and (finding := plate_layout(sights[plate.inverted], plate)) is not None
     ]
     if findings or found > _FEW:
         return tuple(findings)
     questions = (_mirrored,) if found else (_mirrored, _inverted, _other_dictionary)
     for question in questions:
-        answer = question(picture, plan, gates, found)
+        answer = question(sights, plan, gates, found)
         if answer is not None:
             return (answer,)
     return ()
 
 
-def plate_layout(picture: Picture, plate: CharucoPlate) -> Finding | None:
+def plate_layout(sight: Sight, plate: CharucoPlate) -> Finding | None:
     """Whether the markers seen lie as on another plate than the one described."""
-    side = picture.negative if plate.inverted else picture
-    markers = opencv.detect_markers(side.grey, plate.dictionary)
+    markers = sight.markers(plate.dictionary, (plate,))
     own, _ = plane_markers(plate, markers)
-    if len(own) < _ENOUGH_MARKERS or agreeing(plate, markers).mean() >= LAYOUT_AGREEMENT:
+    if len(own) < _ENOUGH_MARKERS or believable(plate, markers):
         return None
     return other_layout(plate, markers)
 
@@ -112,11 +118,13 @@ def _variant(plate: CharucoPlate, columns: int, legacy: bool) -> CharucoPlate:
     )
 
 
-def _mirrored(picture: Picture, plan: TargetPlan, gates: Gates, found: int) -> Finding | None:
+def _mirrored(
+    sights: Mapping[bool, Sight], plan: TargetPlan, gates: Gates, found: int
+) -> Finding | None:
     rings = [c for c in plan.carriers if isinstance(c, RingCarrier)]
     count = 0
-    for inverted in sorted({c.inverted for c in plan.carriers}):
-        side = picture.negative if inverted else picture
+    for inverted, sight in sights.items():
+        side = sight.picture
         count += _known_markers(side.mirrored, plan, inverted)
         mine = [c for c in rings if c.inverted == inverted]
         count += mirrored_codes(side, ring_dots(side, gates), mine) if mine else 0
@@ -129,10 +137,12 @@ def _mirrored(picture: Picture, plan: TargetPlan, gates: Gates, found: int) -> F
     )
 
 
-def _inverted(picture: Picture, plan: TargetPlan, gates: Gates, found: int) -> Finding | None:
+def _inverted(
+    sights: Mapping[bool, Sight], plan: TargetPlan, gates: Gates, found: int
+) -> Finding | None:
     del gates, found
-    for inverted in sorted({c.inverted for c in plan.carriers}):
-        side = picture if inverted else picture.negative
+    for inverted, sight in sights.items():
+        side = sight.picture.negative
         if _known_markers(side, plan, inverted) >= 2:
             return Finding(
                 "inverted",
@@ -152,13 +162,14 @@ def _known_markers(picture: Picture, plan: TargetPlan, inverted: bool) -> int:
 
 
 def _other_dictionary(
-    picture: Picture, plan: TargetPlan, gates: Gates, found: int
+    sights: Mapping[bool, Sight], plan: TargetPlan, gates: Gates, found: int
 ) -> Finding | None:
     del gates, found
     carriers = [c for c in plan.carriers if isinstance(c, CharucoPlate | MarkerCarrier)]
     if not carriers:
         return None
     mine = sorted({c.dictionary for c in carriers})
+    picture = sights[carriers[0].inverted].picture
     counts = {
         name: len(opencv.detect_markers(picture.grey, name))
         for name in opencv.dictionary_names()

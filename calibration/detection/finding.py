@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 
-from calibration.detection import opencv
 from calibration.detection.carriers import carrier_strangers
 from calibration.detection.diagnosis import diagnose
 from calibration.detection.found import Detections, Finding, Point
@@ -18,6 +17,7 @@ from calibration.detection.markers import marker_points
 from calibration.detection.opencv import AnyImage, Markers
 from calibration.detection.plates import plate_points
 from calibration.detection.rings import ring_dots, ring_points
+from calibration.detection.seeing import Sight
 from calibration.targets.kinds import (
     CarrierKind,
     CharucoPlate,
@@ -43,16 +43,21 @@ def find_targets(
     gates = Gates() if gates is None else gates
     points: list[Point] = []
     rejections: list[Rejection] = []
+    sights: dict[bool, Sight] = {}
     for inverted in sorted({c.inverted for c in plan.carriers}):
         carriers = [c for c in plan.carriers if c.inverted == inverted]
-        side = picture.negative if inverted else picture
-        for part in (_square_targets(side, carriers, gates), _rings(side, carriers, gates)):
+        sight = Sight(picture.negative if inverted else picture)
+        sights[inverted] = sight
+        for part in (
+            _square_targets(sight, carriers, gates),
+            _rings(sight.picture, carriers, gates),
+        ):
             points += part[0]
             rejections += part[1]
     points, doubles = _unique(points)
     points, strangers = carrier_strangers(plan, points, picture.size_px, gates)
     rejections += doubles + strangers
-    findings = diagnose(picture, plan, gates, len(points)) if explain else ()
+    findings = diagnose(sights, plan, gates, len(points)) if explain else ()
     if any(f.code == "mirrored" for f in findings):
         points = []
     return _detections(plan, picture, points, rejections, findings)
@@ -66,20 +71,20 @@ def as_picture(image: Source) -> Picture:
 
 
 def _square_targets(
-    picture: Picture, carriers: Sequence[CarrierKind], gates: Gates
+    sight: Sight, carriers: Sequence[CarrierKind], gates: Gates
 ) -> tuple[list[Point], list[Rejection]]:
     points: list[Point] = []
     rejections: list[Rejection] = []
     squares = [c for c in carriers if isinstance(c, CharucoPlate | MarkerCarrier)]
     for dictionary in sorted({c.dictionary for c in squares}):
-        markers, doubles = once(opencv.detect_markers(picture.grey, dictionary))
+        markers, doubles = once(sight.markers(dictionary, squares))
         mine = [c for c in squares if c.dictionary == dictionary]
         rejections += [d for d in doubles if _wanted(mine, d)]
         for carrier in mine:
             if isinstance(carrier, CharucoPlate):
-                found = plate_points(picture, carrier, markers, gates)
+                found = plate_points(sight.picture, carrier, markers, gates)
             else:
-                found = marker_points(picture, carrier, markers, gates)
+                found = marker_points(sight.picture, carrier, markers, gates)
             points += found[0]
             rejections += found[1]
     return points, rejections

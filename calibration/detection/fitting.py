@@ -62,9 +62,7 @@ def _cut(
     picture: Picture, pattern: Pattern, start: Floats, gates: Gates
 ) -> Window | tuple[Rule, float, float]:
     """The piece of the picture that shows the target's paper."""
-    left, top, right, bottom = pattern.extent_mm
-    rim = np.array([[left, top], [right, top], [right, bottom], [left, bottom]])
-    seen = localmap.to_picture(start, rim)
+    seen = localmap.to_picture(start, pattern.outline_mm)
     if not np.isfinite(seen).all():
         return Rule.FIT, 1.0, gates.misfit
     low, high = seen.min(axis=0), seen.max(axis=0)

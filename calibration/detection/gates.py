@@ -84,7 +84,7 @@ class Gates:
     saturated_share: float = 0.2
     contrast: float = 12.0
     blur_share: float = 0.4
-    misfit: float = 0.12
+    misfit: float = 0.16
     plane_px: float = 0.5
     plane_share: float = 0.02
     pose_share: float = 0.03

@@ -175,18 +175,17 @@ def _check_seen(jobs: Sequence[DetectionJob], found: Sequence[Detections]) -> No
         if explained.findings:
             raise explained.findings[0].error(f"camera {camera}")
         rejected = Counter(r.rule.value for k in mine for r in found[k].rejections)
-        seen = f"; {sum(rejected.values())} were rejected, most by rule {_most(rejected)}"
+        seen = ""
+        if rejected:
+            rule = rejected.most_common(1)[0][0]
+            seen = f"; {sum(rejected.values())} were rejected, most by rule {rule}"
         raise InputError(
             "targets-none",
             f"camera {camera} shows no target of set {job.plan.name!r} in its {len(mine)} "
-            f"pictures{seen if rejected else ''}",
+            f"pictures{seen}",
             "check that the targets are in view, sharp and well lit, and that the target file "
             "is theirs",
         )
-
-
-def _most(counts: Counter[str]) -> str:
-    return counts.most_common(1)[0][0]
 
 
 def _observations(

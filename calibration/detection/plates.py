@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -119,6 +119,21 @@ def agreeing(plate: CharucoPlate, markers: Markers) -> Bools:
     return np.zeros(len(own), dtype=bool) if found is None else found[1]
 
 
+def believable(plate: CharucoPlate, markers: Markers) -> bool:
+    """Whether the markers seen may lie on such a plate.
+
+    On plates of odd columns most markers of the legacy pattern are merely shifted by a square
+    and agree among themselves, so the pattern with which more of them agree is the true one.
+    """
+    good = agreeing(plate, markers)
+    if len(good) == 0 or good.all():
+        return True
+    if good.mean() < LAYOUT_AGREEMENT:
+        return False
+    other = replace(plate, legacy=not plate.legacy)
+    return plate.rows % 2 == 1 or int(agreeing(other, markers).sum()) <= int(good.sum())
+
+
 def _consistent(plate: CharucoPlate, markers: Markers) -> tuple[Markers, list[Rejection]]:
     own, _ = plane_markers(plate, markers)
     good = agreeing(plate, markers)
@@ -132,7 +147,7 @@ def _consistent(plate: CharucoPlate, markers: Markers) -> tuple[Markers, list[Re
         )
         for k in np.flatnonzero(~good)
     ]
-    if len(good) and good.mean() < LAYOUT_AGREEMENT:
+    if not believable(plate, markers):
         good[:] = False
     return Markers(own.ids[good], own.corners_px[good]), strangers
 
@@ -226,7 +241,7 @@ def _in_plane(
     """Corners that lie where their neighbours say; the worst goes, then all are asked anew."""
     good = good.copy()
     plane = plate.corner_grid_mm[guesses.numbers]
-    limit = np.maximum(gates.plane_px, gates.plane_share * guesses.square_px)
+    limit = np.maximum(gates.plane_px, gates.plane_share * guesses.square_px) + 1e-9
     while good.any():
         rows = np.flatnonzero(good)
         excess = neighbour_residuals(plane[rows], pixel[rows]) / limit[rows]

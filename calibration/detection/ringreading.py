@@ -14,6 +14,7 @@ from geometry.arrays import Bools, Floats, Ints
 _SAMPLES_PER_BIT = 8
 _LARGEST_FLAW = 0.12
 _CELL_PX = 32.0
+_SPOKES = 16
 _SURE = 0.8
 """Share of a sector's samples that must agree on its bit."""
 
@@ -112,12 +113,51 @@ def proper_axes(axes_px: Floats) -> Floats:
     return np.asarray(turned)
 
 
+def _sharpened(grey: Bytes, dots: Dots) -> Dots:
+    """Dots with ellipses through half the step from black to white.
+
+    A threshold that follows the surroundings cuts all edges too far out, and so makes a slanted
+    dot rounder than it is; two and a half radii out that is a different ring.
+    """
+    edge, found = _edges(grey, dots)
+    middle = edge.mean(axis=2)
+    x, y = edge[:, 0] - middle[:, :1], edge[:, 1] - middle[:, 1:]
+    design = np.stack([x * x, 2.0 * x * y, y * y], axis=-1)
+    normal = design.transpose(0, 2, 1) @ design + 1e-9 * np.eye(3)
+    form = np.linalg.solve(normal, design.sum(axis=1)[..., None])[..., 0]
+    values, vectors = np.linalg.eigh(form[:, [0, 1, 1, 2]].reshape(-1, 2, 2))
+    axes = proper_axes(vectors / np.sqrt(np.maximum(values, 1e-6))[:, None, :])
+    good = np.asarray(found & np.all(values > 1e-6, axis=1))
+    return Dots(dots.centres_px + middle, axes, dots.flaw).only(good)
+
+
+def _edges(grey: Bytes, dots: Dots) -> tuple[Floats, Bools]:
+    """Where each dot's edge is along its spokes, (n, 2, spokes) from its middle; found at all."""
+    angle = 2.0 * np.pi * (np.arange(_SPOKES) + 0.5) / _SPOKES
+    spokes = np.stack([np.cos(angle), np.sin(angle)])
+    reach = np.linspace(0.5, 1.5, 21)
+    levels = np.stack([_ring(grey, dots, r, _SPOKES) for r in reach], axis=-1)
+    middle = (_middle(grey, dots) + np.median(levels[:, :, -1], axis=1)) / 2.0
+    above = levels > middle[:, None, None]
+    first = np.clip(np.argmax(above, axis=2), 1, None)[..., None]
+    low, high = (np.take_along_axis(levels, first - k, axis=2)[..., 0] for k in (1, 0))
+    part = np.clip((middle[:, None] - low) / np.where(high > low, high - low, 1.0), 0.0, 1.0)
+    radius = reach[first[..., 0] - 1] + part * (reach[1] - reach[0])
+    found = np.asarray(np.all(above.any(axis=2), axis=1))
+    return (dots.axes_px @ spokes) * radius[:, None, :], found
+
+
+def _middle(grey: Bytes, dots: Dots) -> Floats:
+    """Grey levels (n,) in the middle of each dot."""
+    return opencv.sampled(grey, dots.centres_px[:, None, :])[:, 0]
+
+
 def ringed(grey: Bytes, dots: Dots) -> Dots:
     """Dots with white round them, then something black in a ring, then white again."""
     if len(dots) == 0:
         return dots
-    dots = Dots(dots.centres_px, proper_axes(dots.axes_px), dots.flaw)
-    black = grey[tuple(np.rint(dots.centres_px[:, ::-1]).astype(int).T)].astype(np.float64)
+    dots = _sharpened(grey, Dots(dots.centres_px, proper_axes(dots.axes_px), dots.flaw))
+    black = _middle(grey, dots)
     inner = _ring(grey, dots, 1.5, 32)
     outer = _ring(grey, dots, 3.5, 48)
     band = _ring(grey, dots, (RING_INNER + RING_OUTER) / 2.0, 112)
@@ -135,7 +175,7 @@ def read_codes(grey: Bytes, dots: Dots, bits: int) -> list[Reading]:
     """The word on each dot's ring."""
     band = np.mean([_ring(grey, dots, r, bits * _SAMPLES_PER_BIT) for r in (2.35, 2.5, 2.65)], 0)
     white = np.median(_ring(grey, dots, 1.5, 32), axis=1)
-    black = grey[tuple(np.rint(dots.centres_px[:, ::-1]).astype(int).T)].astype(np.float64)
+    black = _middle(grey, dots)
     dark = band < ((white + black) / 2.0)[:, None]
     return [_read(row, bits) for row in dark]
 
@@ -161,7 +201,7 @@ def sure(reading: Reading) -> bool:
 
 
 def _ring(grey: Bytes, dots: Dots, radius: float, samples: int) -> Floats:
-    """Grey levels (n, samples) on an ellipse of so many radii; outside the picture black."""
+    """Grey levels (n, samples) on an ellipse of so many radii."""
     angle = 2.0 * np.pi * (np.arange(samples) + 0.5) / samples
     circle = radius * np.stack([np.cos(angle), np.sin(angle)])
     place = dots.centres_px[:, :, None] + dots.axes_px @ circle

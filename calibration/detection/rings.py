@@ -23,7 +23,7 @@ from calibration.targets.kinds import RING_QUIET, RingCarrier
 from calibration.targets.patterns import RingPattern
 from geometry.arrays import Floats
 
-_MISFIT_SHARE = 0.7
+_MISFIT_SHARE = 0.5
 """A code that is wrong by half a sector changes little of the whole picture: less is allowed."""
 
 

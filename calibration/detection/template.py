@@ -153,14 +153,11 @@ def _sound(state: Floats) -> bool:
 
 def _weight(pattern: Pattern, state: Floats, pixels: Floats) -> Bools:
     """Which pixels lie on the target's paper and show nothing of its edge, where there is room."""
-    left, top, right, bottom = pattern.extent_mm
+    left, _, right, _ = pattern.extent_mm
     place = localmap.places(state, pixels)
-    matrix = np.linalg.norm(state[localmap.MATRIX].reshape(2, 2), axis=1)
-    size = np.array([right - left, bottom - top])
-    guard = np.minimum(matrix * (0.7 + 2.5 * state[BLUR]), 0.08 * size)
-    low = place - np.array([left, top]) > guard
-    high = np.array([right, bottom]) - place > guard
-    return np.asarray((low & high).all(axis=1))
+    pixel_mm = float(np.linalg.norm(state[localmap.MATRIX].reshape(2, 2), axis=1).max())
+    guard = min(pixel_mm * (0.7 + 2.5 * float(state[BLUR])), 0.08 * (right - left))
+    return np.asarray(pattern.within_mm(place[:, 0], place[:, 1]) > guard)
 
 
 def synthesise(pattern: Pattern, state: Floats, window: Window) -> Expected:

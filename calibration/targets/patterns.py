@@ -37,12 +37,21 @@ class Pattern(Protocol):
         ...
 
     @property
+    def outline_mm(self) -> Floats:
+        """Points (n, 2) whose hull is what belongs to the target."""
+        ...
+
+    @property
     def finest_mm(self) -> float:
         """Size of the smallest part: boxes must be smaller."""
         ...
 
     def white_share(self, x_mm: Floats, y_mm: Floats, box_mm: tuple[float, float]) -> Floats:
         """Share of white (0 to 1) in boxes about the places, all arrays of one shape."""
+        ...
+
+    def within_mm(self, x_mm: Floats, y_mm: Floats) -> Floats:
+        """How far inside what belongs to the target places are, negative outside."""
         ...
 
 
@@ -74,9 +83,18 @@ class ModulePattern:
         )
 
     @property
+    def outline_mm(self) -> Floats:
+        """Corners of the border."""
+        return _corners(self.extent_mm)
+
+    @property
     def finest_mm(self) -> float:
         """Side of a module, or the dot's radius."""
         return self.module_mm * (DOT_RADIUS_MODULES if self.dot else 1.0)
+
+    def within_mm(self, x_mm: Floats, y_mm: Floats) -> Floats:
+        """Distance to the nearest edge of the border."""
+        return _within(self.extent_mm, x_mm, y_mm)
 
     @property
     def middle_mm(self) -> tuple[float, float]:
@@ -124,6 +142,17 @@ class RingPattern:
         return -reach, -reach, reach, reach
 
     @property
+    def outline_mm(self) -> Floats:
+        """Points on the edge of the clear space."""
+        angle = np.arange(16) * np.pi / 8.0
+        circle = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+        return np.asarray(RING_QUIET * self.dot_radius_mm * circle)
+
+    def within_mm(self, x_mm: Floats, y_mm: Floats) -> Floats:
+        """Distance to the edge of the clear space, which is round: paper may be cut anyhow."""
+        return np.asarray(RING_QUIET * self.dot_radius_mm - np.hypot(x_mm, y_mm))
+
+    @property
     def finest_mm(self) -> float:
         """Half the dot's radius: two thirds of a sector at the ring's inner edge."""
         return self.dot_radius_mm / 2.0
@@ -147,7 +176,18 @@ class RingPattern:
 def _polar(x_mm: Floats, y_mm: Floats, box_mm: tuple[float, float]) -> tuple[Floats, Floats]:
     """Distance from the origin, and the box's size along that direction."""
     away = np.maximum(np.hypot(x_mm, y_mm), 1e-12)
-    return away, np.hypot(x_mm * box_mm[0], y_mm * box_mm[1]) / away
+    return away, np.maximum(np.hypot(x_mm * box_mm[0], y_mm * box_mm[1]) / away, min(box_mm))
+
+
+def _corners(extent_mm: tuple[float, float, float, float]) -> Floats:
+    left, top, right, bottom = extent_mm
+    return np.array([[left, top], [right, top], [right, bottom], [left, bottom]])
+
+
+def _within(extent_mm: tuple[float, float, float, float], x_mm: Floats, y_mm: Floats) -> Floats:
+    left, top, right, bottom = extent_mm
+    across, down = np.minimum(x_mm - left, right - x_mm), np.minimum(y_mm - top, bottom - y_mm)
+    return np.minimum(across, down)
 
 
 def _inside(depth: Floats, box: float | Floats) -> Floats:
@@ -183,10 +223,19 @@ class PlatePattern:
         return self.squares.extent_mm
 
     @property
+    def outline_mm(self) -> Floats:
+        """Corners of the border."""
+        return _corners(self.extent_mm)
+
+    @property
     def finest_mm(self) -> float:
         """Side of a marker's module, or half the margin round it."""
         margin = (self.plate.square_mm - self.plate.marker_mm) / 4.0
         return min(self.plate.marker_mm / self._modules_per_marker, margin)
+
+    def within_mm(self, x_mm: Floats, y_mm: Floats) -> Floats:
+        """Distance to the nearest edge of the border."""
+        return _within(self.extent_mm, x_mm, y_mm)
 
     @property
     def _modules_per_marker(self) -> int:
