@@ -9,7 +9,7 @@ from fastapi.responses import HTMLResponse
 from pydantic import Field
 
 from calibration.check import Kind
-from calibration.files import read_check
+from calibration.files import CHECKS
 from calibration.report import history_of, history_page
 from service.api.calibrations import resource as calibrations
 from service.api.context import ServiceDep
@@ -174,7 +174,7 @@ def read_history(service: ServiceDep, job_id: str) -> HTMLResponse:
         if job.request["reference"] != job_id or job.result is None:
             continue
         files = {file.name: file.path for file in service.store.jobs.files(job.id)}
-        records.append(read_check(files["check.json"]))
+        records.append(CHECKS.read(files["check.json"]))
     return HTMLResponse(history_page(history_of(records, job_id)))
 
 

@@ -19,7 +19,7 @@ from service.api.context import ServiceDep
 from service.api.designs import resource as designs
 from service.api.models import Model, problems
 
-JSON = dict[str, Any]
+JSON = dict[Any, Any]
 router = APIRouter(tags=["exports"])
 _NO_TIME = (1980, 1, 1, 0, 0, 0)
 """The same design gives the same bytes."""
@@ -40,7 +40,7 @@ class ExportList(Model):
     items: list[ExportFormat]
 
 
-_ZIP = {200: {"description": "The files, as a ZIP archive.", "content": {"application/zip": {}}}}
+_ZIP: JSON = {200: {"description": "The files, as a ZIP archive.", "content": {"application/zip": {}}}}
 
 
 @router.get(designs.path + "/{job_id}/exports", response_model=ExportList, responses=problems(404))
@@ -96,7 +96,8 @@ def read_calibration_export(service: ServiceDep, job_id: str, form: str) -> Resp
     file = calibrations.file(service, job_id, "calibration.json")
     built = service.store.jobs.inputs(job_id).get("design")
     like = () if built is None else read_design(built[1]).cameras
-    return _zipped(form, rig_cameras(read_calibration(Path(file.path)).cameras, like))
+    calibrated = read_calibration(Path(file.path)).calibration
+    return _zipped(form, rig_cameras(calibrated.cameras, like))
 
 
 def _zipped(form: str, cameras: tuple[RigCamera, ...]) -> Response:

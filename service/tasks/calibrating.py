@@ -6,7 +6,6 @@ What all have: the target set as input ``targets``, the pictures as in
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -18,8 +17,15 @@ from calibration.acceptance.certificate import Heading
 from calibration.adjustment import CalibratedCamera, CalibrationOptions, ReferencePoses, calibrate
 from calibration.adjustment.options import FIXED, FREE, InteriorModel
 from calibration.check import CheckOptions, check
-from calibration.files import read_calibration, read_check, write_calibration, write_check
-from calibration.files.checkfile import CheckRecord
+from calibration.files import (
+    ACCEPTANCES,
+    CHECKS,
+    AcceptanceRecord,
+    CalibrationRecord,
+    CheckRecord,
+    read_calibration,
+    write_calibration,
+)
 from calibration.report import calibration_page, check_page, history_of, history_page
 from rig.designfile import read_design
 from service.measuring.figures import acceptance_figures, calibration_figures, check_figures
@@ -39,9 +45,9 @@ def calibration(
     seen = see(plan, request, inputs, folder, report, cancel)
     options = _options(request, inputs)
     done = calibrate(seen.observations, options, _after(report), cancel)
-    name, made = request["name"], request["made_utc"]
-    write_calibration(folder / "calibration.json", done, name, made)
-    _write(folder / "report.html", calibration_page(done, name, made))
+    record = CalibrationRecord(request["name"], request["made_utc"], done)
+    write_calibration(folder / "calibration.json", record)
+    _write(folder / "report.html", calibration_page(record))
     report(Progress("done", 1.0))
     return {"detection": seen_figures(seen), **calibration_figures(done)}
 
@@ -68,14 +74,14 @@ def rig_check(
 
     With earlier checks (inputs ``check-0``, ``check-1``...) there is a ``history.html`` as well.
     """
-    reference = read_calibration(inputs["calibration"])
+    reference = read_calibration(inputs["calibration"]).calibration
     seen = see(read_targets(inputs["targets"]), request, inputs, folder, report, cancel)
     limits = {k: request[k] for k in ("hidden_limit_mm", "tolerance_mm") if request.get(k)}
     result = check(reference, seen.observations, CheckOptions(**limits), _after(report), cancel)
     record = CheckRecord(request["reference"], request["made_utc"], result)
-    write_check(folder / "check.json", record)
+    CHECKS.write(folder / "check.json", record)
     _write(folder / "report.html", check_page(record, reference))
-    earlier = [read_check(path) for role, path in inputs.items() if role.startswith("check-")]
+    earlier = [CHECKS.read(path) for role, path in inputs.items() if role.startswith("check-")]
     if earlier:
         history = history_of([*earlier, record], request["reference"])
         _write(folder / "history.html", history_page(history))
@@ -87,7 +93,7 @@ def acceptance(
     request: Request, inputs: Inputs, folder: Path, report: ProgressCallback, cancel: CancelToken
 ) -> JSON:
     """Measure a calibrated bar along several lines; writes ``certificate.pdf``."""
-    reference = read_calibration(inputs["calibration"])
+    reference = read_calibration(inputs["calibration"]).calibration
     seen = see(read_targets(inputs["targets"]), request, inputs, folder, report, cancel)
     limit, volume = LengthLimit(*request["limit"]), Volume(*request["volume"])
     done = accept(reference, seen.observations, limit, volume, _after(report), cancel)
@@ -100,10 +106,10 @@ def acceptance(
         temperature_degc=request["temperature_degc"],
     )
     (folder / "certificate.pdf").write_bytes(certificate_pdf(done, heading))
-    figures = acceptance_figures(done)
-    _write(folder / "acceptance.json", json.dumps(figures, allow_nan=False) + "\n")
+    record = AcceptanceRecord(request["reference"], request["made_utc"], done)
+    ACCEPTANCES.write(folder / "acceptance.json", record)
     report(Progress("done", 1.0))
-    return {"detection": seen_figures(seen), **figures}
+    return {"detection": seen_figures(seen), **acceptance_figures(done)}
 
 
 def _after(report: ProgressCallback) -> ProgressCallback:
