@@ -25,7 +25,7 @@ from rig.mounts.settings import (
 from rig.mounts.structure import Hole, Joint, Member, PlacedPart, Plate, Solid, Structure, Wedge
 
 KIND = Camera(
-    "basler-aca2440-75um fujinon-hf16xa-5m",
+    "basler-aca2500-14u canon-ef-50-f14",
     (2448, 2048),
     0.00345,
     16.0,
