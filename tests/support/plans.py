@@ -9,6 +9,7 @@ import numpy as np
 from geometry.camera import Body, Camera, RigCamera
 from geometry.frames import Pose
 from rig.bodies import place_body
+from rig.brackets import wedge_corners_mm
 from rig.convex import box_corners
 from rig.mounts.plan import Figures, MountPlan, Price, Tolerance
 from rig.mounts.settings import (
@@ -317,6 +318,7 @@ def plate_plan(
     ]
     for mount in mounts:
         solids += camera_solids(mount.camera)
+    solids += [Solid(w.id, "wedge", wedge_corners_mm(w)) for w in wedges]
     joints = tuple(
         Joint(
             f"screws-{w.id}",

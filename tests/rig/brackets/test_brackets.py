@@ -58,7 +58,7 @@ def check(wedge: Wedge) -> trimesh.Trimesh:
     return mesh
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(
     angle(35.0), angle(35.0), angle(180.0), st.sampled_from(["through", "tapped", "countersunk"])
 )
