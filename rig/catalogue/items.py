@@ -137,7 +137,10 @@ class LensMount(Part):
 
 @dataclass(frozen=True, kw_only=True)
 class Head(Part):
-    """A tripod head: ranges in degrees (pan right, tilt up, roll clockwise), step it is set in."""
+    """A tripod head: ranges in degrees (pan right, tilt up, roll clockwise), step it is set in.
+
+    ``pivot_mm`` is the height over its base at which its axes cross.
+    """
 
     pan_deg: PairOf | None = None
     tilt_deg: PairOf | None = None
@@ -145,6 +148,8 @@ class Head(Part):
     step_deg: float | None = None
     load_kg: float | None = None
     height_mm: float | None = None
+    pivot_mm: float | None = None
+    width_mm: float | None = None
     mass_g: float | None = None
     base_thread: str | None = None
     camera_thread: str | None = None

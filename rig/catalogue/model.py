@@ -176,6 +176,10 @@ class HeadEntry(Entry):
     step_deg: Positive | None = Field(default=None, description="What it can be set to.")
     load_kg: Positive | None = Field(default=None, description="What it carries.")
     height_mm: Positive | None = Field(default=None, description="Base to camera.")
+    pivot_mm: Positive | None = Field(
+        default=None, description="Base to where its axes cross; of a ball, to its middle."
+    )
+    width_mm: Positive | None = Field(default=None, description="Greatest width.")
     mass_g: Positive | None = Field(default=None, description="Mass.")
     base_thread: Words | None = Field(default=None, description="Thread it stands on.")
     camera_thread: Words | None = Field(default=None, description="Thread for the camera.")

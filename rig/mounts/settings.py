@@ -82,13 +82,15 @@ class Link:
 
     ``transform`` maps the frame after it to the frame before it; axis and motion count in the
     frame after it. ``setting`` names the setting that moves the link; a slide moves by its
-    value in mm, a turn by its value in degrees, right-handed.
+    value in mm, a turn by its value in degrees, right-handed. ``per_unit`` converts a setting of
+    another unit: degrees of turn per mm for a carriage on a bent rail.
     """
 
     transform: Floats
     motion: Motion = Motion.FIXED
     axis: Floats | None = None
     setting: str = ""
+    per_unit: float = 1.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "transform", frozen(self.transform))
@@ -102,9 +104,9 @@ class Link:
         """The frame after the link in the frame before it, (4, 4), at a value of its setting."""
         moved = np.eye(4)
         if self.motion is Motion.SLIDE and self.axis is not None:
-            moved[:3, 3] = value * self.axis
+            moved[:3, 3] = value * self.per_unit * self.axis
         elif self.motion is Motion.TURN and self.axis is not None:
-            moved[:3, :3] = turn(self.axis, value)
+            moved[:3, :3] = turn(self.axis, value * self.per_unit)
         return np.asarray(self.transform @ moved)
 
 

@@ -1,0 +1,26 @@
+"""Drawings of a mount plan: views, plates, templates and setting sheets, as DXF, SVG and PDF."""
+
+from rig.drawings.dxf import dxf_bytes
+from rig.drawings.items import Sheet
+from rig.drawings.lists import poses_csv, settings_csv, tapes_csv
+from rig.drawings.pdf import pdf_bytes
+from rig.drawings.plates import plate_sheets
+from rig.drawings.settingsheet import setting_sheets
+from rig.drawings.svg import svg_bytes
+from rig.drawings.templates import template_pages, template_sheet
+from rig.drawings.views import view_sheets
+
+__all__ = [
+    "Sheet",
+    "dxf_bytes",
+    "pdf_bytes",
+    "plate_sheets",
+    "poses_csv",
+    "setting_sheets",
+    "settings_csv",
+    "svg_bytes",
+    "tapes_csv",
+    "template_pages",
+    "template_sheet",
+    "view_sheets",
+]

@@ -1,0 +1,148 @@
+"""The system file: which mount to plan, as a person writes it.
+
+``docs/mounts.md`` lists the keys. ``kind`` alone is enough.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from geometry.errors import InputError, TooLargeError
+from rig.catalogue import Catalogue, load_catalogue
+from rig.mounts.making import SystemSpec
+from rig.mounts.surroundings import Zone
+from rig.mounts.systems.base import MountSystem
+from rig.mounts.systems.heads import HeadKind
+from rig.mounts.systems.parts import outrigger_of, profile_named
+from rig.mounts.systems.tslot import TSlotSystem
+from rig.strict import StrictModel, Vector, validated
+
+SCHEMA: Literal["rigwright.mount/1"] = "rigwright.mount/1"
+LARGEST_FILE_BYTES = 1_000_000
+
+
+class ZoneSection(StrictModel):
+    """A box that stays free."""
+
+    name: str = Field(default="light", min_length=1, max_length=80, description="What it is for.")
+    low_mm: Vector = Field(description="Its least corner in the rig frame.")
+    high_mm: Vector = Field(description="Its greatest corner.")
+
+    @model_validator(mode="after")
+    def _in_order(self) -> ZoneSection:
+        if not all(low < high for low, high in zip(self.low_mm, self.high_mm, strict=True)):
+            raise ValueError("give low_mm below high_mm in x, y and z")
+        return self
+
+
+class SystemFile(StrictModel):
+    """The root of a system file."""
+
+    schema_: Literal["rigwright.mount/1"] = Field(
+        default=SCHEMA, alias="schema", description='Version of the format: `"rigwright.mount/1"`.'
+    )
+    kind: Literal["t-slot"] = Field(description="Kind of mount.")
+    name: str = Field(
+        default="", max_length=200, description="What to call the mount; its kind without it."
+    )
+    profile: str = Field(default="2020", description="Profile of the catalogue.")
+    head: str = Field(default="generic-ball-25", description="Head of the catalogue.")
+    slot_step_mm: float = Field(
+        default=1.0, gt=0.0, le=50.0, description="To what a slide can be set."
+    )
+    head_step_deg: float | None = Field(
+        default=None, gt=0.0, le=10.0, description="To what a head can be set, if not as listed."
+    )
+    share_mm: float = Field(
+        default=150.0, ge=0.0, le=400.0,
+        description="How far beside an upright or a rail a camera may still hang on it.",
+    )  # fmt: skip
+    clearance_mm: float = Field(
+        default=2.0, ge=0.0, le=100.0, description="Least gap between parts that do not touch."
+    )
+    spare: float = Field(
+        default=1.0, ge=0.0, le=2.0,
+        description="How much of the effect of settings half a step off the limits are kept clear "
+        "of; 0 keeps the limits only.",
+    )  # fmt: skip
+    floor_z_mm: float | None = Field(
+        default=None, description="Height of the floor. Without it: 1200 mm under the datum."
+    )
+    head_entry: bool = Field(
+        default=True, description="Keep the way free by which the subject comes and goes."
+    )
+    zone: list[ZoneSection] = Field(
+        default_factory=list, description="Boxes that stay free, for lights above all."
+    )
+    prices: dict[str, float] = Field(
+        default_factory=dict, description="Price of a part by its catalogue id; profiles per metre."
+    )
+    currency: str = Field(default="EUR", max_length=8, description="Currency of the prices.")
+
+    def to_spec(self, catalogue: Catalogue) -> SystemSpec:
+        """The mount as the rest of the program sees it."""
+        return SystemSpec(
+            name=self.name or self.kind,
+            system=self._system(catalogue),
+            zones=tuple(Zone(z.name, np.array(z.low_mm), np.array(z.high_mm)) for z in self.zone),
+            entry=self.head_entry,
+            floor_z_mm=self.floor_z_mm,
+            clearance_mm=self.clearance_mm,
+            spare=self.spare,
+            prices=dict(self.prices),
+            currency=self.currency,
+        )
+
+    def _system(self, catalogue: Catalogue) -> MountSystem:
+        head = HeadKind.named(self.head, catalogue)
+        if self.head_step_deg is not None:
+            head = replace(head, step_deg=self.head_step_deg)
+        profile = profile_named(self.profile, catalogue)
+        return TSlotSystem(outrigger_of(profile, head, catalogue), self.slot_step_mm, self.share_mm)
+
+
+def system_from_mapping(
+    data: Mapping[str, object], name: str = "mount", catalogue: Catalogue | None = None
+) -> SystemSpec:
+    """A mount system from parsed TOML or JSON; ``name`` stands in front of every error."""
+    return validated(SystemFile, data, name).to_spec(catalogue or load_catalogue())
+
+
+def parse_system(text: str, name: str = "mount", catalogue: Catalogue | None = None) -> SystemSpec:
+    """A mount system from the text of a file; raises a one-line :class:`InputError`."""
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(
+            "mount-not-toml", f"{name} is not a system file: {error}", "write it as TOML"
+        ) from error
+    return system_from_mapping(data, name, catalogue)
+
+
+def read_system(path: Path, catalogue: Catalogue | None = None) -> SystemSpec:
+    """A mount system from a file; raises a one-line :class:`InputError`."""
+    try:
+        if path.stat().st_size > LARGEST_FILE_BYTES:
+            raise TooLargeError(
+                "mount-too-large",
+                f"{path.name} is too large for a system file",
+                "give the mount's TOML file",
+            )
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        reason = (error.strerror or "unreadable").lower()
+        raise InputError(
+            "mount-unreadable", f"cannot read the system file {path} ({reason})", "check the path"
+        ) from error
+    except UnicodeDecodeError as error:
+        raise InputError(
+            "mount-not-toml", f"{path.name} is not a text file", "give the mount's TOML file"
+        ) from error
+    return parse_system(text, path.name, catalogue)
