@@ -9,6 +9,7 @@ KINDS = {
     for kind in (
         JobKind("design", "service.tasks.designing:design"),
         JobKind("evaluation", "service.tasks.designing:evaluation"),
+        JobKind("plan", "service.tasks.planning:plan"),
         JobKind("calibration", "service.tasks.calibrating:calibration"),
         JobKind("check", "service.tasks.calibrating:rig_check"),
         JobKind("acceptance", "service.tasks.calibrating:acceptance"),

@@ -19,6 +19,7 @@ from service.api import (
     evaluations,
     exports,
     picturesets,
+    plans,
     rigs,
     rigtests,
     root,
@@ -50,7 +51,7 @@ def make_app() -> FastAPI:
         redoc_url=None,
     )
     resources = (
-        *(root, scans, designs, exports, evaluations),
+        *(root, scans, designs, exports, plans, evaluations),
         *(rigs, captures, rigtests, sessions),
         *(targetsets, picturesets, calibrations, checks, acceptances),
     )

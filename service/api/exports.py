@@ -40,7 +40,9 @@ class ExportList(Model):
     items: list[ExportFormat]
 
 
-_ZIP: JSON = {200: {"description": "The files, as a ZIP archive.", "content": {"application/zip": {}}}}
+_ZIP: JSON = {
+    200: {"description": "The files, as a ZIP archive.", "content": {"application/zip": {}}}
+}
 
 
 @router.get(designs.path + "/{job_id}/exports", response_model=ExportList, responses=problems(404))

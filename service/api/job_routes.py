@@ -141,7 +141,7 @@ class JobResource:
             return FileList(items=items)
 
         @router.get(
-            self.path + "/{job_id}/files/{name}",
+            self.path + "/{job_id}/files/{name:path}",
             response_class=FileResponse,
             responses=problems(404, 409) | _any_file("application/octet-stream"),
         )

@@ -18,7 +18,7 @@ _LITTLE_DISK_BYTES = 1 << 30
 
 
 _RESOURCES = (
-    *("health", "scans", "designs", "evaluations"),
+    *("health", "scans", "designs", "plans", "evaluations"),
     *("rigs", "captures", "rig-tests", "sessions"),
     *("target-sets", "picture-sets", "calibrations", "checks", "acceptances"),
 )

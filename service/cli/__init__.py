@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from service.cli import measurecommands, partcommands, rigcommands
+from service.cli import measurecommands, partcommands, plancommands, rigcommands
 
 app = typer.Typer(
     name="rigwright",
@@ -185,6 +185,7 @@ def serve(
 
 
 partcommands.add_to(app)
+plancommands.add_to(app)
 measurecommands.add_to(app)
 rigcommands.add_to(app)
 

@@ -29,7 +29,13 @@ from service.wire import error_fields
 
 _RETRY_S = 1.0
 _MEDIA_TYPES = mimetypes.MimeTypes()
-_MEDIA_TYPES.add_type("model/gltf-binary", ".glb")
+for _ending, _media_type in (
+    (".glb", "model/gltf-binary"),
+    (".stl", "model/stl"),
+    (".3mf", "model/3mf"),
+    (".dxf", "image/vnd.dxf"),
+):
+    _MEDIA_TYPES.add_type(_media_type, _ending)
 
 
 class JobManager:
@@ -157,11 +163,12 @@ class JobManager:
 
     def _keep(self, job: JobRecord, result: dict[str, Any], folder: Path) -> None:
         files = {
-            path.name: (
+            path.relative_to(folder).as_posix(): (
                 self._store.files.stage_existing(path),
                 _MEDIA_TYPES.guess_type(path.name)[0] or "application/octet-stream",
             )
-            for path in sorted(folder.iterdir())
+            for path in sorted(folder.rglob("*"))
+            if path.is_file()
         }
         self._store.jobs.complete(job.id, result, files)
         logs.log.info("job completed")
