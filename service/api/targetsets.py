@@ -1,0 +1,166 @@
+"""``/v1/target-sets``: coded targets, to be printed and to be found in pictures."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Query, Response
+from pydantic import AwareDatetime, Field
+
+from calibration.targets.files import TargetsModel, read_targets, targets_of, targets_text
+from calibration.targets.kinds import TargetPlan
+from geometry.errors import NotFoundError
+from service.api.context import Service, ServiceDep
+from service.api.models import Cursor, Limit, Model, problems
+from service.measuring.sheets import sheets_of
+from service.store.documents import DocumentRecord
+
+JSON = dict[str, Any]
+KIND = "target-set"
+PATH = "/v1/target-sets"
+router = APIRouter(tags=["target sets"])
+Page = Annotated[
+    str, Query(max_length=40, description="A4, A3, 'A4 landscape', or 600x400 in millimetres.")
+]
+
+
+class TargetSet(Model):
+    """A target set. The same content is the same target set."""
+
+    id: str
+    name: str
+    created_at: AwareDatetime
+    targets: int
+    carriers: Annotated[dict[str, int], Field(description="Number of targets by carrier.")]
+    links: dict[str, str]
+
+
+class TargetSetPage(Model):
+    """Target sets, newest first. ``next`` is the cursor of the next page, null on the last."""
+
+    items: list[TargetSet]
+    next: int | None
+
+
+class SheetEntry(Model):
+    """A file made of a target set."""
+
+    name: str
+    carrier: str
+    media_type: str
+    href: str
+
+
+class SheetList(Model):
+    """All files made of a target set."""
+
+    items: list[SheetEntry]
+
+
+def _document(record: DocumentRecord) -> TargetSet:
+    own = f"{PATH}/{record.id}"
+    return TargetSet(
+        id=record.id,
+        name=record.report["name"],
+        created_at=record.created_at,  # type: ignore[arg-type]
+        targets=sum(record.report["carriers"].values()),
+        carriers=record.report["carriers"],
+        links={"self": own, "file": f"{own}/file", "sheets": f"{own}/sheets"},
+    )
+
+
+def keep_targets(service: Service, plan: TargetPlan) -> tuple[DocumentRecord, bool]:
+    """Put a target set into the store; the flag tells whether it is new."""
+    report = {"name": plan.name, "carriers": {c.name: len(c.ids) for c in plan.carriers}}
+    with service.store.files.stage(".toml") as staging:
+        staging.write(targets_text(plan).encode())
+        return service.store.documents.add(KIND, staging.finish(), "targets.toml", report)
+
+
+@router.post(
+    PATH,
+    status_code=201,
+    response_model=TargetSet,
+    responses=problems(400, 413, 422, 507)
+    | {200: {"model": TargetSet, "description": "The target set was here already."}},
+)
+def add_target_set(request: TargetsModel, response: Response, service: ServiceDep) -> TargetSet:
+    """Add a target set: the structure of a target file, as JSON."""
+    record, new = keep_targets(service, targets_of(request))
+    response.status_code = 201 if new else 200
+    response.headers["Location"] = f"{PATH}/{record.id}"
+    return _document(record)
+
+
+@router.get(PATH, response_model=TargetSetPage, responses=problems(422))
+def list_target_sets(service: ServiceDep, limit: Limit = 50, cursor: Cursor = None) -> JSON:
+    """List target sets, newest first."""
+    found = service.store.documents.page(KIND, limit + 1, cursor)
+    shown = found[:limit]
+    return {
+        "items": [_document(record) for record in shown],
+        "next": shown[-1].seq if len(found) > limit else None,
+    }
+
+
+@router.get(PATH + "/{target_set_id}", response_model=TargetSet, responses=problems(404))
+def read_target_set(service: ServiceDep, target_set_id: str) -> TargetSet:
+    """Read what a target set holds."""
+    return _document(service.store.documents.get(KIND, target_set_id))
+
+
+@router.get(
+    PATH + "/{target_set_id}/file",
+    response_class=Response,
+    responses=problems(404)
+    | {200: {"description": "The target file.", "content": {"application/toml": {}}}},
+)
+def read_target_file(service: ServiceDep, target_set_id: str) -> Response:
+    """Fetch a target set as a target file (TOML)."""
+    record = service.store.documents.get(KIND, target_set_id)
+    content = service.store.documents.path(record).read_bytes()
+    return Response(content, media_type="application/toml")
+
+
+@router.get(
+    PATH + "/{target_set_id}/sheets", response_model=SheetList, responses=problems(404, 422)
+)
+def list_sheets(service: ServiceDep, target_set_id: str, page: Page = "A4") -> JSON:
+    """List what can be printed, and the pictures for simulations."""
+    items = [
+        {
+            "name": sheet.name,
+            "carrier": sheet.carrier,
+            "media_type": sheet.media_type,
+            "href": f"{PATH}/{target_set_id}/sheets/{sheet.name}",
+        }
+        for sheet in sheets_of(_plan(service, target_set_id), page).values()
+    ]
+    return {"items": items}
+
+
+@router.get(
+    PATH + "/{target_set_id}/sheets/{name}",
+    response_class=Response,
+    responses=problems(404, 422)
+    | {200: {"description": "The file.", "content": {"application/pdf": {}}}},
+)
+def read_sheet(service: ServiceDep, target_set_id: str, name: str, page: Page = "A4") -> Response:
+    """Fetch a sheet to print (PDF, SVG), or a picture of a carrier for simulations (PNG)."""
+    sheets = sheets_of(_plan(service, target_set_id), page)
+    if name not in sheets:
+        raise NotFoundError(
+            "file", f"the target set has no sheet {name!r}", f"see {PATH}/{target_set_id}/sheets"
+        )
+    return Response(sheets[name].make(), media_type=sheets[name].media_type)
+
+
+@router.delete(PATH + "/{target_set_id}", status_code=204, responses=problems(404))
+def remove_target_set(service: ServiceDep, target_set_id: str) -> None:
+    """Remove a target set. Calibrations and checks made with it stay."""
+    service.store.documents.remove(KIND, target_set_id)
+
+
+def _plan(service: Service, target_set_id: str) -> TargetPlan:
+    documents = service.store.documents
+    return read_targets(documents.path(documents.get(KIND, target_set_id)))

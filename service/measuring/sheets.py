@@ -1,0 +1,64 @@
+"""What is made of a target set: sheets to print, pictures for the simulated studio."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from calibration.targets.faces import carrier_face
+from calibration.targets.kinds import CarrierKind, TargetPlan
+from calibration.targets.printing import carrier_drawings, to_pdf, to_svg
+from geometry.errors import InputError
+from service.store.scans import plain_name
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """One file made of a carrier; ``make`` makes it."""
+
+    name: str
+    carrier: str
+    media_type: str
+    make: Callable[[], bytes]
+
+
+def sheets_of(plan: TargetPlan, page: str = "A4") -> Mapping[str, Sheet]:
+    """By file name: a PDF of each carrier, an SVG of each of its pages, a picture if it is flat.
+
+    Raises :class:`InputError` for a carrier that does not fit its page.
+    """
+    sheets: list[Sheet] = []
+    for carrier in plan.carriers:
+        sheets += _printed(carrier, page)
+        sheets += _pictured(carrier)
+    return {sheet.name: sheet for sheet in sheets}
+
+
+def _printed(carrier: CarrierKind, page: str) -> list[Sheet]:
+    drawings = carrier_drawings(carrier, page)
+    stem = _stem(carrier)
+    many = len(drawings) > 1
+    svgs = [
+        Sheet(
+            f"{stem}-{number}.svg" if many else f"{stem}.svg",
+            carrier.name,
+            "image/svg+xml",
+            lambda drawing=drawing: to_svg(drawing).encode(),  # type: ignore[misc]
+        )
+        for number, drawing in enumerate(drawings, 1)
+    ]
+    whole = lambda: to_pdf(drawings, carrier.name)  # noqa: E731 - one of the makers above
+    return [Sheet(f"{stem}.pdf", carrier.name, "application/pdf", whole), *svgs]
+
+
+def _pictured(carrier: CarrierKind) -> list[Sheet]:
+    make = lambda: carrier_face(carrier).png  # noqa: E731 - as above
+    try:
+        carrier_face(carrier, px_per_mm=0.5)
+    except InputError:
+        return []
+    return [Sheet(f"{_stem(carrier)}.png", carrier.name, "image/png", make)]
+
+
+def _stem(carrier: CarrierKind) -> str:
+    return plain_name(f"{carrier.name}.x").removesuffix(".x")
