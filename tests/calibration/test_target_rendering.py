@@ -36,7 +36,7 @@ def from_points(kind: CarrierKind, view: Camera, turn: Floats, shift: Floats) ->
 
 @pytest.mark.parametrize("kind", [scenes.PLATE, scenes.markers(1), scenes.rings(1)])
 def test_a_rendered_picture_is_the_one_that_points_make(kind: CarrierKind) -> None:
-    view = scenes.camera((48, 40), 120.0 if kind is scenes.PLATE else 300.0, -0.1)
+    view = scenes.camera((36, 32), 90.0 if kind is scenes.PLATE else 220.0, -0.1)
     turn = scenes.rotation(35.0, 10.0, 20.0)
     shift = np.array([0.0, 0.0, 300.0]) - turn @ scenes.middle_mm(kind)
     own = render(view, placed_carrier(kind, turn, shift), 0.7, 30.0, 220.0, 150.0)

@@ -1,0 +1,321 @@
+"""Target files: a target set as TOML that people read and write."""
+
+from __future__ import annotations
+
+import difflib
+import math
+import os
+import secrets
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from calibration.observations import Distance
+from calibration.targets.kinds import (
+    UNKNOWN_MM,
+    CarrierKind,
+    CharucoPlate,
+    MarkerCarrier,
+    Place,
+    RingCarrier,
+    Ruler,
+    TargetPlan,
+    marker_numbers,
+)
+from calibration.targets.ringcodes import RingCodeFamily
+from geometry.errors import ConflictError, InputError
+
+SCHEMA = "rigwright.targets/1"
+LARGEST_BYTES = 5_000_000
+PLACE_SIGMA_MM = (0.1, 0.1, 0.1)
+"""What is taken for a place that is given without a sigma."""
+
+Triple = tuple[float, float, float]
+Sigma = Annotated[float, Field(ge=0.0, allow_inf_nan=True)]
+Sigmas = tuple[Sigma, Sigma, Sigma]
+
+
+class _Model(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class RulerModel(_Model):
+    """A ruler as drawn and as measured on the print."""
+
+    drawn_mm: float
+    measured_mm: float
+    sigma_mm: float = 0.1
+
+
+class PlaceModel(_Model):
+    """One target; without ``position_mm`` its place is not known."""
+
+    number: int
+    position_mm: Triple | None = None
+    sigma_mm: Sigmas | None = None
+
+
+class PlateModel(_Model):
+    """A ChArUco plate."""
+
+    name: str
+    columns: int
+    rows: int
+    square_mm: float
+    marker_mm: float
+    dictionary: str
+    first_marker: int = 0
+    legacy: bool = False
+    inverted: bool = False
+    fixed: bool = False
+    sigma_mm: Sigmas = (0.02, 0.02, 0.1)
+    ruler: RulerModel | None = None
+
+
+class MarkersModel(_Model):
+    """Square markers on a carrier."""
+
+    name: str
+    dictionary: str
+    size_mm: float
+    dot: bool = False
+    corners: bool = False
+    inverted: bool = False
+    fixed: bool = False
+    ruler: RulerModel | None = None
+    targets: Annotated[list[PlaceModel], Field(min_length=1)]
+
+
+class RingsModel(_Model):
+    """Ring-coded targets on a carrier, or a scale bar."""
+
+    name: str
+    dot_radius_mm: float
+    bits: Literal[12, 14] = 12
+    code_distance: Literal[1, 2] = 2
+    mirror_unique: bool = True
+    complement_unique: bool = False
+    inverted: bool = False
+    fixed: bool = False
+    bar: bool = False
+    ruler: RulerModel | None = None
+    targets: Annotated[list[PlaceModel], Field(min_length=1)]
+
+
+class DistanceModel(_Model):
+    """A measured distance between two targets of one carrier."""
+
+    first: str
+    second: str
+    length_mm: float
+    sigma_mm: float
+
+
+class TargetsModel(_Model):
+    """The whole file."""
+
+    schema_: Literal["rigwright.targets/1"] = Field(alias="schema")
+    name: str
+    plates: list[PlateModel] = []
+    markers: list[MarkersModel] = []
+    rings: list[RingsModel] = []
+    distances: list[DistanceModel] = []
+
+
+def read_targets(path: Path) -> TargetPlan:
+    """The target set in a file. Raises a one-line :class:`InputError` naming the file."""
+    try:
+        if path.stat().st_size > LARGEST_BYTES:
+            raise InputError("targets-size", f"{path.name} is too large", "give a target file")
+        text = path.read_text("utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(
+            "targets-read", f"{path.name} cannot be read", "check the path; it must be UTF-8 text"
+        ) from error
+    return targets_from(text, path.name)
+
+
+def targets_from(text: str, source: str = "the target file") -> TargetPlan:
+    """The target set in a file's text. Raises a one-line :class:`InputError` naming it."""
+    try:
+        model = TargetsModel.model_validate(tomllib.loads(text))
+    except tomllib.TOMLDecodeError as error:
+        problem = f"{source} is not TOML ({str(error)[:120]})"
+        raise InputError("targets-toml", problem, "correct that line") from error
+    except ValidationError as error:
+        raise _one_line(error, source) from error
+    carriers: list[CarrierKind] = [_plate(m) for m in model.plates]
+    carriers += [_markers(m) for m in model.markers]
+    carriers += [_rings(m) for m in model.rings]
+    distances = tuple(Distance(**m.model_dump()) for m in model.distances)
+    for carrier in carriers:
+        _check_markers(carrier)
+        _check_units(carrier)
+    return TargetPlan(model.name, tuple(carriers), distances)
+
+
+def targets_text(plan: TargetPlan) -> str:
+    """A target set as a file's text; values that are as usual are left out."""
+    import tomlkit
+
+    document = tomlkit.document()
+    document.add(tomlkit.comment("Coded targets. Lengths in millimetres, as drawn; a ruler says"))
+    document.add(tomlkit.comment("how large they came out: ruler = { drawn_mm, measured_mm }."))
+    document["schema"] = SCHEMA
+    document["name"] = plan.name
+    tables: dict[str, list[dict[str, Any]]] = {"plates": [], "markers": [], "rings": []}
+    for carrier in plan.carriers:
+        key, model = _model(carrier)
+        tables[key].append(model.model_dump(exclude_defaults=True))
+    tables["distances"] = [vars(d) for d in plan.distances]
+    for key, rows in tables.items():
+        array = tomlkit.aot()
+        for row in rows:
+            array.append(_table(row))
+        if rows:
+            document[key] = array
+    return str(tomlkit.dumps(document))
+
+
+def write_targets(plan: TargetPlan, path: Path, overwrite: bool = False) -> None:
+    """Write a target file, whole or not at all."""
+    if path.exists() and not overwrite:
+        raise ConflictError(
+            "file-exists", f"{path.name} exists already", "give another name, or allow overwriting"
+        )
+    part = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
+    try:
+        part.write_text(targets_text(plan), "utf-8")
+        os.replace(part, path)  # noqa: PTH105 - one system call, and the name says what it does
+    except OSError as error:
+        part.unlink(missing_ok=True)
+        raise InputError(
+            "file-write", f"{path.name} cannot be written ({error.strerror})", "give another folder"
+        ) from error
+
+
+def _check_markers(carrier: CarrierKind) -> None:
+    """Markers that the dictionary does not have."""
+    from calibration.detection import opencv
+
+    for dictionary, number in sorted(marker_numbers(carrier)):
+        size = opencv.dictionary_size(dictionary)
+        if number >= size:
+            raise InputError(
+                "marker-number",
+                f"carrier {carrier.name!r} shows marker {number}, but {dictionary} has none",
+                f"choose numbers from 0 to {size - 1}, or a larger dictionary",
+            )
+
+
+def _check_units(carrier: CarrierKind) -> None:
+    """Sizes that no camera of a face rig could use are of another unit."""
+    if isinstance(carrier, CharucoPlate):
+        key, size, low, high = "square_mm", carrier.square_mm, 1.0, 300.0
+    elif isinstance(carrier, MarkerCarrier):
+        key, size, low, high = "size_mm", carrier.size_mm, 2.0, 1000.0
+    else:
+        key, size, low, high = "dot_radius_mm", carrier.dot_radius_mm, 0.3, 60.0
+    if not low <= size <= high:
+        raise InputError(
+            "targets-units",
+            f"{key} = {size:g} of carrier {carrier.name!r} cannot be millimetres",
+            f"give millimetres, {low:g} to {high:g}",
+        )
+
+
+def _table(row: dict[str, Any]) -> Any:  # noqa: ANN401 - tomlkit's own type
+    import tomlkit
+
+    table = tomlkit.table()
+    for key, value in row.items():
+        if key == "ruler":
+            inline = tomlkit.inline_table()
+            inline.update(value)
+            table[key] = inline
+        elif key == "targets":
+            lines = tomlkit.array()
+            for place in value:
+                inline = tomlkit.inline_table()
+                inline.update(place)
+                lines.append(inline)
+            table[key] = lines.multiline(True)
+        else:
+            table[key] = value
+    return table
+
+
+_FAMILY = ("bits", "code_distance", "mirror_unique", "complement_unique")
+
+
+def _ruler(model: RulerModel | None) -> Ruler | None:
+    return None if model is None else Ruler(**model.model_dump())
+
+
+def _places(models: list[PlaceModel]) -> tuple[Place, ...]:
+    out = []
+    for m in models:
+        if m.position_mm is None:
+            out.append(Place(m.number, UNKNOWN_MM))
+        else:
+            out.append(Place(m.number, m.position_mm, m.sigma_mm or PLACE_SIGMA_MM))
+    return tuple(out)
+
+
+def _plate(m: PlateModel) -> CharucoPlate:
+    return CharucoPlate(**{**m.model_dump(), "ruler": _ruler(m.ruler)})
+
+
+def _markers(m: MarkersModel) -> MarkerCarrier:
+    rest = m.model_dump(exclude={"targets", "ruler"})
+    return MarkerCarrier(**rest, places=_places(m.targets), ruler=_ruler(m.ruler))
+
+
+def _rings(m: RingsModel) -> RingCarrier:
+    rest = m.model_dump(exclude={"targets", "ruler", *_FAMILY})
+    family = RingCodeFamily(m.bits, m.mirror_unique, m.complement_unique, m.code_distance)
+    return RingCarrier(**rest, places=_places(m.targets), ruler=_ruler(m.ruler), family=family)
+
+
+def _model(carrier: CarrierKind) -> tuple[str, _Model]:
+    values = vars(carrier).copy()
+    ruler = values.pop("ruler")
+    values["ruler"] = None if ruler is None else vars(ruler)
+    if isinstance(carrier, CharucoPlate):
+        return "plates", PlateModel(**values)
+    values["targets"] = [_place(p) for p in values.pop("places")]
+    if isinstance(carrier, MarkerCarrier):
+        return "markers", MarkersModel(**values)
+    family = values.pop("family")
+    values |= {k: getattr(family, k) for k in _FAMILY if k != "code_distance"}
+    return "rings", RingsModel(code_distance=family.distance, **values)
+
+
+def _place(place: Place) -> dict[str, Any]:
+    if not all(map(math.isfinite, place.position_mm)):
+        return {"number": place.number}
+    return {
+        "number": place.number,
+        "position_mm": place.position_mm,
+        "sigma_mm": place.sigma_mm,
+    }
+
+
+def _one_line(error: ValidationError, source: str) -> InputError:
+    """The most telling finding; a misspelt key first, since it makes another seem missing."""
+    found = sorted(error.errors(), key=lambda e: e["type"] != "extra_forbidden")
+    first = found[0]
+    more = f" ({len(found) - 1} more after it)" if len(found) > 1 else ""
+    where = ".".join(str(part) for part in first["loc"]) or "the file"
+    if first["type"] == "extra_forbidden":
+        known = {k for m in _Model.__subclasses__() for k in m.model_fields}
+        close = difflib.get_close_matches(str(first["loc"][-1]), sorted(known), 1, 0.5)
+        remedy = f"did you mean {close[0]}?" if close else "remove it"
+        return InputError("key-unknown", f"{source}: {where} is not known{more}", remedy)
+    if first["type"] == "missing":
+        return InputError("key-missing", f"{source}: {where} is missing{more}", "add it")
+    remedy = first["msg"][:1].lower() + first["msg"][1:].replace("Input should", "it should")
+    remedy = remedy.replace("input should", "it should")
+    return InputError("value", f"{source}: {where} cannot be used{more}", remedy)
