@@ -146,6 +146,11 @@ def targets_from(text: str, source: str = "the target file") -> TargetPlan:
         raise InputError("targets-toml", problem, "correct that line") from error
     except ValidationError as error:
         raise _one_line(error, source) from error
+    return targets_of(model)
+
+
+def targets_of(model: TargetsModel) -> TargetPlan:
+    """The target set that a file's model describes. Raises :class:`InputError`."""
     carriers: list[CarrierKind] = [_plate(m) for m in model.plates]
     carriers += [_markers(m) for m in model.markers]
     carriers += [_rings(m) for m in model.rings]

@@ -32,6 +32,14 @@ def _print_detection(detection: JSON) -> None:
     )
 
 
+def print_targets(result: JSON) -> None:
+    """A target set, carrier by carrier."""
+    table = Table("Carrier", "Kind", "Targets", title=escape(result["name"]), title_justify="left")
+    for row in result["carriers"]:
+        table.add_row(escape(row["name"]), row["kind"], str(row["targets"]))
+    Console().print(table)
+
+
 def print_calibration(result: JSON) -> None:
     """A calibration: what it is worth, camera by camera."""
     _print_detection(result["detection"])

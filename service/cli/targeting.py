@@ -32,9 +32,7 @@ def run_targets_command(
                 "for example: rigwright targets --design rig/design.json --out targets",
             )
         with new_folder(out, force=force) as folder:
-            result = run_task(
-                "service.tasks.targeting:targets", {"page": page}, inputs, folder
-            )
+            result = run_task("service.tasks.targeting:targets", {"page": page}, inputs, folder)
         _show(result, out, as_json=as_json)
 
 
