@@ -133,7 +133,7 @@ class RigDesk:
             return record, fresh
 
     def _require_ready(self, kind: str) -> None:
-        if self._doing is not None:
+        if self._doing is not None and not self._over(self._doing):
             raise ConflictError(
                 "rig-busy",
                 f"rig {self.name!r} is busy with {self._doing.kind} {self._doing.id}",
@@ -155,6 +155,13 @@ class RigDesk:
             raise InterlockError(
                 "open", f"the interlock of rig {self.name!r} is open", "close it, then ask again"
             )
+
+    def _over(self, job: JobRecord) -> bool:
+        """Whether a job's end can be read already, though its thread is not quite done with it.
+
+        Whoever reads it asks for the next at once, and must not be told that the rig is busy.
+        """
+        return self._books.store.jobs.get(job.id).status.terminal
 
     def _not_open(self) -> RigwrightError:
         # What stood in the way may be gone: ask the thread to try once more.
@@ -212,7 +219,9 @@ class RigDesk:
             end_without_result(self._books.store, job.id, fault)
         finally:
             with self._lock:
-                self._doing = None
+                # The next may have been taken on since this one's end could be read.
+                if self._doing is job:
+                    self._doing = None
             self._books.bell.ring(job.id)
             logs.job_id.reset(token)
 

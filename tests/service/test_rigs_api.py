@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
@@ -26,6 +27,7 @@ from service.rigs.orders import CAPTURE
 from service.settings import read_settings
 from service.store import Store
 from service.store.jobrecords import NewJob
+from service.store.jobs import Jobs
 
 JSON = dict[str, Any]
 ENDED = {"completed", "failed", "cancelled", "interrupted"}
@@ -90,6 +92,19 @@ def test_a_rig_tells_how_its_devices_are(rig: TestClient) -> None:
 
 
 class TestCaptures:
+    def test_the_next_may_be_asked_for_as_soon_as_one_is_seen_to_have_ended(
+        self, rig: TestClient, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        complete = Jobs.complete
+
+        def slow(jobs: Jobs, *given: Any) -> None:  # noqa: ANN401 - whatever it is given
+            complete(jobs, *given)
+            time.sleep(0.4)  # the rig's thread is held up after the end has been written
+
+        monkeypatch.setattr(Jobs, "complete", slow)
+        for name in ("one", "two", "three"):
+            assert end(rig, ask(rig, capture_id=name))["status"] == "completed"
+
     def test_one_is_taken_filed_and_proven(self, rig: TestClient, box: FakeTrigger) -> None:
         job = end(rig, ask(rig, session="anna-1", subject="anna"))
         assert job["status"] == "completed", job["problem"]
