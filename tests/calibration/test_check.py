@@ -231,6 +231,20 @@ def test_of_two_cameras_nobody_can_say_which_moved() -> None:
     assert "cannot tell which" in result.sentence
 
 
+def test_of_three_cameras_nobody_can_say_which_two_moved() -> None:
+    scene = face_scene(face_rig(3), rings=30, frames=6, seed=8)
+    reference = calibrate(
+        scene.observe(0.1, 1), CalibrationOptions(start=scene.cameras, cross_validate=False)
+    )
+    moved = calibrations.disturbed(scene, 1, np.array([0.3, 0.0, 0.0]))
+    moved = calibrations.disturbed(moved, 2, np.array([0.0, 0.3, 0.15]))
+    result = check(reference, moved.observe(0.1, 2))
+    assert result.kinds == (Kind.UNEXPLAINED,)
+    assert result.light is Light.RED
+    assert "cannot tell which" in result.sentence
+    assert {c.verdict for c in result.cameras} == {Kind.CANNOT_TELL}
+
+
 def test_a_camera_that_sees_too_little_is_not_called_fine() -> None:
     observations = SCENE.observe(0.1, 41)
     few = np.flatnonzero((observations.camera != 0) | (np.arange(len(observations.camera)) < 5))
