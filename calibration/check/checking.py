@@ -169,7 +169,7 @@ def verdicts(
     names = diagnosis.epoch.camera_names
     freedom = 2 * len(diagnosis.last.v)
     ratio = float(np.sqrt(diagnosis.last.chi2 / max(freedom, 1)))
-    if ratio > UNEXPLAINED:
+    if ratio > UNEXPLAINED and not diagnosis.nobody_stands:
         told.insert(0, Finding(Kind.UNEXPLAINED, names, words.unexplained(ratio), value=ratio))
     else:
         for k in np.flatnonzero(noise.raised()):
@@ -183,7 +183,8 @@ def verdicts(
                     value=factor,
                 )
             )
-    told += _doubts(cameras)
+    if not diagnosis.nobody_stands:
+        told += _doubts(cameras)
     if not told:
         hidden = max(c.sensitivity.hidden_mm for c in cameras if c.sensitivity)
         hidden *= power95_factor(diagnosis)

@@ -64,6 +64,12 @@ class Diagnosis:
     last: Fit
     outliers: int
 
+    @property
+    def nobody_stands(self) -> bool:
+        """Whether so many cameras changed that nobody can say which did: two must agree."""
+        blamed = {h.subject for h in self.accepted if h.cause in (Cause.POSE, Cause.LENS)}
+        return len(blamed) > 1 and len(np.unique(self.epoch.camera)) - len(blamed) < 2
+
 
 def diagnose(
     epoch: Epoch, state: State, suspects: tuple[int, ...] = (), prepared: Prepared | None = None

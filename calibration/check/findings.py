@@ -66,6 +66,9 @@ def findings(righted: Righted, diagnosis: Diagnosis, found: Effects) -> list[Fin
     """All findings of alarming kinds, gross ones first."""
     out = _gross(righted, diagnosis)
     done = changes(diagnosis)
+    if diagnosis.nobody_stands:
+        out.append(_most_cameras(done, diagnosis))
+        done = tuple(c for c in done if c.cause.cause not in (Cause.POSE, Cause.LENS))
     by_carrier: dict[int, list[Change]] = defaultdict(list)
     sync = []
     for one in done:
@@ -87,6 +90,14 @@ def findings(righted: Righted, diagnosis: Diagnosis, found: Effects) -> list[Fin
     if sync:
         out.append(_unsynchronised(sync, diagnosis))
     return out
+
+
+def _most_cameras(done: tuple[Change, ...], diagnosis: Diagnosis) -> Finding:
+    """Too few cameras agree for naming those that changed."""
+    epoch = diagnosis.epoch
+    names = tuple(epoch.camera_names[int(k)] for k in np.unique(epoch.camera))
+    statistic = max(one.statistic for one in done)
+    return Finding(Kind.UNEXPLAINED, names, words.most_cameras(names), statistic)
 
 
 def _gross(righted: Righted, diagnosis: Diagnosis) -> list[Finding]:

@@ -61,7 +61,7 @@ class Columns:
         return self.reference + 6 * index + np.arange(6)
 
 
-CHUNK = 8192
+CHUNK = 1024
 GONE = 1e-7
 """A column whose score keeps less than this share of its variance is determined by others."""
 
@@ -191,14 +191,15 @@ class Linear:
         """Variance (n, 2) of the fitted image points in units of their own."""
         fitted = self.unknowns @ self.solve(np.ascontiguousarray(self.unknowns.T))
         width = self.design.indptr[1]
-        values = self.design.data.reshape(-1, width)
-        index = self.design.indices.reshape(-1, width)
-        out = np.empty(len(values))
+        # Both coordinates of a point have the same columns.
+        values = self.design.data.reshape(-1, 2, width)
+        index = self.design.indices.reshape(-1, 2, width)[:, 0]
+        out = np.empty((len(values), 2))
         for first in range(0, len(out), CHUNK):
             part = slice(first, first + CHUNK)
             blocks = fitted[index[part, :, None], index[part, None, :]]
-            out[part] = np.einsum("ra,rab,rb->r", values[part], blocks, values[part], optimize=True)
-        return out.reshape(-1, 2)
+            out[part] = np.sum((values[part] @ blocks) * values[part], axis=2)
+        return out
 
 
 def _without(spread: Floats, freed: Floats) -> Floats:

@@ -7,6 +7,7 @@ hypothesis is true, T is noncentral and largest for it (Foerstner's form of Baar
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,7 +42,8 @@ class ScoreTests:
     def __init__(self, hypotheses: tuple[Hypothesis, ...], linear: Linear) -> None:
         """``linear``: the model whose score is to be tested."""
         self.hypotheses = hypotheses
-        roots = [h.ways @ _reduced(h, linear) for h in hypotheses]
+        reduced = _reduced(hypotheses, linear)
+        roots = [h.ways @ r for h, r in zip(hypotheses, reduced, strict=True)]
         self.dof: Ints = np.array([r.shape[1] for r in roots], dtype=np.int64)
         self._root = np.zeros((linear.columns.count, int(self.dof.sum())))
         self._first = np.concatenate([[0], np.cumsum(self.dof)]).astype(np.int64)
@@ -69,23 +71,37 @@ class ScoreTests:
         return float(chi2.isf(self.hypotheses[index].alpha, max(int(self.dof[index]), 1)))
 
 
-def _reduced(hypothesis: Hypothesis, linear: Linear) -> Floats:
-    """R (d, rank) with ``R R^T`` the pseudo-inverse of the hypothesis's covariance (d, d)."""
-    places, ways = hypothesis.columns, hypothesis.ways
-    square = np.ix_(places, places)
-    own = ways.T @ linear.spread[square] @ ways
-    full = np.einsum("cd,cd->d", ways, linear.normal[square] @ ways)
-    diagonal = np.diag(own)
+def _reduced(hypotheses: Sequence[Hypothesis], linear: Linear) -> list[Floats]:
+    """R (d, rank) of each, with ``R R^T`` the pseudo-inverse of its covariance (d, d)."""
+    out: list[Floats] = [np.zeros((0, 0))] * len(hypotheses)
+    shapes: dict[tuple[int, ...], list[int]] = {}
+    for k, h in enumerate(hypotheses):
+        shapes.setdefault(h.ways.shape, []).append(k)
+    # All of one shape at once: there are hundreds, and each is tiny.
+    for members in shapes.values():
+        same = [hypotheses[k] for k in members]
+        for k, root in zip(members, _of_one_shape(same, linear), strict=True):
+            out[k] = root
+    return out
+
+
+def _of_one_shape(hypotheses: Sequence[Hypothesis], linear: Linear) -> list[Floats]:
+    places, ways = np.stack([h.columns for h in hypotheses]), np.stack([h.ways for h in hypotheses])
+    square = places[:, :, None], places[:, None, :]
+    own = np.swapaxes(ways, 1, 2) @ linear.spread[square] @ ways
+    full = np.sum(ways * (linear.normal[square] @ ways), axis=1)
+    diagonal = np.einsum("hdd->hd", own)
     # What others determine has but rounding left: it must not be blown up to a unit.
     kept = diagonal > GONE * full
     scale = np.where(kept, np.sqrt(np.where(kept, diagonal, 1.0)), np.inf)
-    sizes, axes = np.linalg.eigh(own / np.outer(scale, scale))
-    good = sizes > RANK * max(float(sizes.max(initial=0.0)), RANK)
-    return np.asarray(axes[:, good] / scale[:, None] / np.sqrt(sizes[good]))
+    sizes, axes = np.linalg.eigh(own / (scale[:, :, None] * scale[:, None, :]))
+    good = sizes > RANK * np.maximum(sizes.max(axis=1, initial=0.0), RANK)[:, None]
+    roots = axes / scale[:, :, None] / np.sqrt(np.where(good, sizes, 1.0))[:, None, :]
+    return [root[:, rows] for root, rows in zip(roots, good, strict=True)]
 
 
 def estimate(hypothesis: Hypothesis, linear: Linear, score: Floats) -> tuple[Floats, Floats]:
     """The most likely change (d,) along a hypothesis's directions, and its covariance (d, d)."""
-    reduced = _reduced(hypothesis, linear)
+    (reduced,) = _reduced((hypothesis,), linear)
     right = hypothesis.ways.T @ score[hypothesis.columns]
     return np.asarray(reduced @ (reduced.T @ right)), np.asarray(reduced @ reduced.T)

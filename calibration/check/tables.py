@@ -82,7 +82,9 @@ def _camera(
     px, mm = _pose_effect(diagnosis, found, k)
     verdict, reason = Kind.FINE, ""
     accepted = {h.cause for h in diagnosis.accepted if h.subject == k}
-    if Cause.POSE in accepted:
+    if diagnosis.nobody_stands:
+        verdict, reason = Kind.CANNOT_TELL, "most cameras changed"
+    elif Cause.POSE in accepted:
         verdict = Kind.CAMERA_MOVED
     elif Cause.LENS in accepted:
         verdict = Kind.LENS_CHANGED

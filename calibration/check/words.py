@@ -117,6 +117,14 @@ def unexplained(ratio: float) -> str:
     )
 
 
+def most_cameras(cameras: tuple[str, ...]) -> str:
+    """So many cameras changed that the others cannot tell which."""
+    return (
+        f"No two of {joined(cameras)} agree with the reference any more: most of them moved, and "
+        "the images cannot tell which. Calibrate anew."
+    )
+
+
 def few(cameras: tuple[str, ...], count: int) -> str:
     """Cameras saw too little."""
     return (

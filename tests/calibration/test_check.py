@@ -96,6 +96,17 @@ def test_two_cameras_moved() -> None:
     only(checked(scene), Kind.CAMERA_MOVED, "cam1", "cam4")
 
 
+def test_two_of_four_cameras_far_off_are_told_from_the_two_that_stand() -> None:
+    """There is no majority; but the two that stand agree, and the two that moved do not."""
+    scene = face_scene(face_rig(4), rings=40, frames=5, seed=2)
+    reference = calibrate(
+        scene.observe(0.1, 3), CalibrationOptions(start=scene.cameras, cross_validate=False)
+    )
+    moved = calibrations.disturbed(scene, 0, np.array([0.5, 0.3, 0.2]))
+    moved = calibrations.disturbed(moved, 2, turn_rad=np.array([2e-4, 2e-4, 0.0]))
+    only(check(reference, moved.observe(0.1, 4), STRICT), Kind.CAMERA_MOVED, "cam1", "cam3")
+
+
 def test_a_refocused_lens_is_told_from_a_movement() -> None:
     cameras = list(SCENE.cameras)
     i = cameras[4].interior
@@ -163,10 +174,14 @@ def test_swapped_cameras() -> None:
     only(checked(SCENE.with_cameras(tuple(cameras))), Kind.CAMERAS_SWAPPED, "cam2", "cam4")
 
 
-def test_a_late_camera_is_a_fault_of_the_trigger() -> None:
+@pytest.mark.parametrize("size_mm", [0.2, 5.0])
+def test_a_late_camera_is_a_fault_of_the_trigger(size_mm: float) -> None:
     rng = np.random.default_rng(2)
     seen = {
-        (2, f): Placed(rotation_of(1e-3 * rng.normal(size=3)) @ p.rotation, p.shift_mm + 0.2 * way)
+        (2, f): Placed(
+            rotation_of(5e-3 * size_mm * rng.normal(size=3)) @ p.rotation,
+            p.shift_mm + size_mm * way,
+        )
         for f, p in enumerate(SCENE.places[1])
         for way in [rng.normal(size=3)]
     }
@@ -214,6 +229,20 @@ def test_of_two_cameras_nobody_can_say_which_moved() -> None:
     assert result.kinds == (Kind.CANNOT_TELL,)
     assert set(result.findings[0].subjects) == {"cam1", "cam2"}
     assert "cannot tell which" in result.sentence
+
+
+def test_of_three_cameras_nobody_can_say_which_two_moved() -> None:
+    scene = face_scene(face_rig(3), rings=30, frames=6, seed=8)
+    reference = calibrate(
+        scene.observe(0.1, 1), CalibrationOptions(start=scene.cameras, cross_validate=False)
+    )
+    moved = calibrations.disturbed(scene, 1, np.array([0.3, 0.0, 0.0]))
+    moved = calibrations.disturbed(moved, 2, np.array([0.0, 0.3, 0.15]))
+    result = check(reference, moved.observe(0.1, 2))
+    assert result.kinds == (Kind.UNEXPLAINED,)
+    assert result.light is Light.RED
+    assert "cannot tell which" in result.sentence
+    assert {c.verdict for c in result.cameras} == {Kind.CANNOT_TELL}
 
 
 def test_a_camera_that_sees_too_little_is_not_called_fine() -> None:
