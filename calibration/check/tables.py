@@ -245,7 +245,9 @@ def length_checks(
 
 def _point_spread(diagnosis: Diagnosis) -> Floats:
     """Covariance (places, targets, 3, 3) of intersected targets from image noise alone, mm^2."""
-    epoch, linear = diagnosis.epoch, diagnosis.first.linear
+    linear = diagnosis.first.linear
+    # Not the diagnosis's own: rows that are blunders were still in it at that time.
+    epoch = linear.epoch
     places, targets = len(epoch.place_carrier), len(epoch.target_names)
     width = linear.design.indptr[1]
     by_shift = linear.design.data.reshape(-1, 2, width)[:, :, PER_CAMERA + 3 : PER_CAMERA + 6]

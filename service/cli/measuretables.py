@@ -16,6 +16,10 @@ def _number(value: float | None, digits: int = 3) -> str:
     return "-" if value is None else f"{value:.{digits}f}"
 
 
+def _load(statistic: float | None, limit: float | None) -> str:
+    return "-" if statistic is None or not limit else f"{statistic / limit:.2f}"
+
+
 def _say(*lines: str) -> None:
     console = Console(highlight=False)
     for line in lines:
@@ -87,16 +91,15 @@ def print_check(result: JSON) -> None:
     console = Console(highlight=False)
     console.print(f"[bold {_LIGHTS[light]}]{light.upper()}[/]  {escape(result['text'])}")
     table = Table(
-        *("Camera", "Verdict", "Test", "Limit", "Effect mm", "Effect px", "Could hide mm"),
-        title="Cameras (effects at the subject)",
+        *("Camera", "Verdict", "Test", "Effect mm", "Effect px", "Could hide mm"),
+        title="Cameras (a test above 1 alarms; effects at the subject)",
         title_justify="left",
     )
     for row in result["cameras"]:
         table.add_row(
             escape(row["name"]),
             row["verdict"] + (f" ({escape(row['reason'])})" if row["reason"] else ""),
-            _number(row["pose_statistic"], 1),
-            _number(row["pose_limit"], 1),
+            _load(row["pose_statistic"], row["pose_limit"]),
             _number(row["effect_mm"]),
             _number(row["effect_px"]),
             _number(row["hidden_mm"]),
