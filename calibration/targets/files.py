@@ -157,7 +157,10 @@ def targets_from(text: str, source: str = "the target file") -> TargetPlan:
 
 
 def targets_text(plan: TargetPlan) -> str:
-    """A target set as a file's text; values that are as usual are left out."""
+    """A target set as a file's text; values that are as usual are left out.
+
+    A file has plates first, then markers, then ring targets, and is read in that order.
+    """
     import tomlkit
 
     document = tomlkit.document()
