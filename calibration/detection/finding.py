@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from calibration.detection.carriers import carrier_strangers
 from calibration.detection.diagnosis import diagnose
@@ -39,8 +40,12 @@ def find_targets(
     usual reasons (mirrored, another board); that takes several times as long. Raises a one-line
     :class:`InputError` for what is not a picture.
     """
-    picture = as_picture(image)
-    gates = Gates() if gates is None else gates
+    # The matrices are small: threads would only get in each other's way.
+    with threadpool_limits(1):
+        return _found(as_picture(image), plan, Gates() if gates is None else gates, explain)
+
+
+def _found(picture: Picture, plan: TargetPlan, gates: Gates, explain: bool) -> Detections:
     points: list[Point] = []
     rejections: list[Rejection] = []
     sights: dict[bool, Sight] = {}

@@ -14,6 +14,7 @@ from calibration.detection.finding import as_picture, find_targets
 from calibration.detection.found import Detections
 from calibration.detection.gates import Gates
 from calibration.detection.opencv import AnyImage
+from calibration.detection.selftest import require_opencv
 from calibration.observations import Observations
 from calibration.targets.kinds import TargetPlan
 from geometry.errors import CancelledError, InputError
@@ -90,9 +91,11 @@ def detect_pictures(
     done here. Raises :class:`CancelledError`, and one-line :class:`InputError` for: no pictures,
     two of one camera and frame, a picture that cannot be read, pictures of one camera in
     different sizes, and a camera that saw no target at all, with the reason where it is known.
+    Raises :class:`DeviceError` when this OpenCV measures wrongly.
     """
     gates = Gates() if gates is None else gates
     _check_list(pictures)
+    require_opencv()
     jobs = [DetectionJob(picture, plan, gates) for picture in pictures]
     found: list[Detections] = []
     for number, result in enumerate(_results(jobs, cancel or NeverCancelled(), executor), 1):

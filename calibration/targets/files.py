@@ -8,11 +8,20 @@ import os
 import secrets
 import tomllib
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import ValidationError
 
 from calibration.observations import Distance
+from calibration.targets.filekeys import (
+    MarkersModel,
+    PlaceModel,
+    PlateModel,
+    RingsModel,
+    RulerModel,
+    StrictModel,
+    TargetsModel,
+)
 from calibration.targets.kinds import (
     UNKNOWN_MM,
     CarrierKind,
@@ -31,97 +40,6 @@ SCHEMA = "rigwright.targets/1"
 LARGEST_BYTES = 5_000_000
 PLACE_SIGMA_MM = (0.1, 0.1, 0.1)
 """What is taken for a place that is given without a sigma."""
-
-Triple = tuple[float, float, float]
-Sigma = Annotated[float, Field(ge=0.0, allow_inf_nan=True)]
-Sigmas = tuple[Sigma, Sigma, Sigma]
-
-
-class _Model(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class RulerModel(_Model):
-    """A ruler as drawn and as measured on the print."""
-
-    drawn_mm: float
-    measured_mm: float
-    sigma_mm: float = 0.1
-
-
-class PlaceModel(_Model):
-    """One target; without ``position_mm`` its place is not known."""
-
-    number: int
-    position_mm: Triple | None = None
-    sigma_mm: Sigmas | None = None
-
-
-class PlateModel(_Model):
-    """A ChArUco plate."""
-
-    name: str
-    columns: int
-    rows: int
-    square_mm: float
-    marker_mm: float
-    dictionary: str
-    first_marker: int = 0
-    legacy: bool = False
-    inverted: bool = False
-    fixed: bool = False
-    sigma_mm: Sigmas = (0.02, 0.02, 0.1)
-    ruler: RulerModel | None = None
-
-
-class MarkersModel(_Model):
-    """Square markers on a carrier."""
-
-    name: str
-    dictionary: str
-    size_mm: float
-    dot: bool = False
-    corners: bool = False
-    inverted: bool = False
-    fixed: bool = False
-    ruler: RulerModel | None = None
-    targets: Annotated[list[PlaceModel], Field(min_length=1)]
-
-
-class RingsModel(_Model):
-    """Ring-coded targets on a carrier, or a scale bar."""
-
-    name: str
-    dot_radius_mm: float
-    bits: Literal[12, 14] = 12
-    code_distance: Literal[1, 2] = 2
-    mirror_unique: bool = True
-    complement_unique: bool = False
-    inverted: bool = False
-    fixed: bool = False
-    bar: bool = False
-    ruler: RulerModel | None = None
-    targets: Annotated[list[PlaceModel], Field(min_length=1)]
-
-
-class DistanceModel(_Model):
-    """A measured distance between two targets of one carrier."""
-
-    first: str
-    second: str
-    length_mm: float
-    sigma_mm: float
-
-
-class TargetsModel(_Model):
-    """The whole file."""
-
-    schema_: Literal["rigwright.targets/1"] = Field(alias="schema")
-    name: str
-    plates: list[PlateModel] = []
-    markers: list[MarkersModel] = []
-    rings: list[RingsModel] = []
-    distances: list[DistanceModel] = []
 
 
 def read_targets(path: Path) -> TargetPlan:
@@ -162,7 +80,10 @@ def targets_of(model: TargetsModel) -> TargetPlan:
 
 
 def targets_text(plan: TargetPlan) -> str:
-    """A target set as a file's text; values that are as usual are left out."""
+    """A target set as a file's text; values that are as usual are left out.
+
+    A file has plates first, then markers, then ring targets, and is read in that order.
+    """
     import tomlkit
 
     document = tomlkit.document()
@@ -284,7 +205,7 @@ def _rings(m: RingsModel) -> RingCarrier:
     return RingCarrier(**rest, places=_places(m.targets), ruler=_ruler(m.ruler), family=family)
 
 
-def _model(carrier: CarrierKind) -> tuple[str, _Model]:
+def _model(carrier: CarrierKind) -> tuple[str, StrictModel]:
     values = vars(carrier).copy()
     ruler = values.pop("ruler")
     values["ruler"] = None if ruler is None else vars(ruler)
@@ -315,7 +236,7 @@ def _one_line(error: ValidationError, source: str) -> InputError:
     more = f" ({len(found) - 1} more after it)" if len(found) > 1 else ""
     where = ".".join(str(part) for part in first["loc"]) or "the file"
     if first["type"] == "extra_forbidden":
-        known = {k for m in _Model.__subclasses__() for k in m.model_fields}
+        known = {k for m in StrictModel.__subclasses__() for k in m.model_fields}
         close = difflib.get_close_matches(str(first["loc"][-1]), sorted(known), 1, 0.5)
         remedy = f"did you mean {close[0]}?" if close else "remove it"
         return InputError("key-unknown", f"{source}: {where} is not known{more}", remedy)

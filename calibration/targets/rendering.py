@@ -13,6 +13,7 @@ from functools import lru_cache
 
 import numpy as np
 from scipy.special import ndtr
+from threadpoolctl import threadpool_limits
 
 from calibration.targets.patterns import SOFTNESS, Pattern
 from geometry.arrays import Floats
@@ -61,15 +62,23 @@ def render(
     """Grey levels (H, W) of the patterns, later ones before earlier ones; no noise yet."""
     width, height = camera.image_size_px
     image = np.full((height, width), float(background))
-    for item in placed:
-        left, top, right, bottom = _bounds(camera, item, 4.0 * blur_px + 2.0)
-        for y in range(top, bottom, _TILE):
-            for x in range(left, right, _TILE):
-                size = min(_TILE, right - x), min(_TILE, bottom - y)
-                share, cover = _tile(camera, item, (x, y), size, blur_px)
-                part = image[y : y + size[1], x : x + size[0]]
-                part += black * cover + (white - black) * share - part * cover
+    # The matrices are small: threads would only get in each other's way.
+    with threadpool_limits(1):
+        for item in placed:
+            _paint(camera, item, image, blur_px, black, white)
     return image
+
+
+def _paint(
+    camera: Camera, item: PlacedPattern, image: Floats, blur_px: float, black: float, white: float
+) -> None:
+    left, top, right, bottom = _bounds(camera, item, 4.0 * blur_px + 2.0)
+    for y in range(top, bottom, _TILE):
+        for x in range(left, right, _TILE):
+            size = min(_TILE, right - x), min(_TILE, bottom - y)
+            share, cover = _tile(camera, item, (x, y), size, blur_px)
+            part = image[y : y + size[1], x : x + size[0]]
+            part += black * cover + (white - black) * share - part * cover
 
 
 def photographed(grey: Floats, noise: float, seed: int, bits: int = 8) -> np.ndarray:

@@ -31,7 +31,7 @@ names = st.text(st.characters(codec="utf-8", exclude_categories=("C",)), min_siz
 rulers = st.one_of(st.none(), st.builds(Ruler, st.just(100.0), st.floats(90.0, 110.0)))
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(names, known, rulers, st.booleans())
 def test_what_is_written_is_read(name: str, place: Place, ruler: Ruler | None, flag: bool) -> None:
     bar, distances = scale_bar("bar", (40, 41), (200.0,), 3.0)

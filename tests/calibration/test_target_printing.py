@@ -105,10 +105,10 @@ def test_svg_and_pdf_are_drawn_alike() -> None:
 
 
 def test_targets_without_places_fill_as_many_pages_as_they_need() -> None:
-    kind = RingCarrier("stand", 9.0, tuple(Place(n) for n in range(1, 15)))
+    kind = RingCarrier("stand", 14.0, tuple(Place(n) for n in range(1, 6)))
     assert len(carrier_drawings(kind, "A4")) == 3
     seen: set[str] = set()
-    for image in pages(kind, "A4", 40):
+    for image in pages(kind, "A4", 25):
         seen |= set(find_targets(softened(image), TargetPlan("set", (kind,))).ids)
     assert seen == set(kind.ids)
 

@@ -1,0 +1,100 @@
+"""The keys of a target file, checked strictly."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Triple = tuple[float, float, float]
+Sigma = Annotated[float, Field(ge=0.0, allow_inf_nan=True)]
+Sigmas = tuple[Sigma, Sigma, Sigma]
+
+
+class StrictModel(BaseModel):
+    """Unknown keys and NaN are errors."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class RulerModel(StrictModel):
+    """A ruler as drawn and as measured on the print."""
+
+    drawn_mm: float
+    measured_mm: float
+    sigma_mm: float = 0.1
+
+
+class PlaceModel(StrictModel):
+    """One target; without ``position_mm`` its place is not known."""
+
+    number: int
+    position_mm: Triple | None = None
+    sigma_mm: Sigmas | None = None
+
+
+class PlateModel(StrictModel):
+    """A ChArUco plate."""
+
+    name: str
+    columns: int
+    rows: int
+    square_mm: float
+    marker_mm: float
+    dictionary: str
+    first_marker: int = 0
+    legacy: bool = False
+    inverted: bool = False
+    fixed: bool = False
+    sigma_mm: Sigmas = (0.02, 0.02, 0.1)
+    ruler: RulerModel | None = None
+
+
+class MarkersModel(StrictModel):
+    """Square markers on a carrier."""
+
+    name: str
+    dictionary: str
+    size_mm: float
+    dot: bool = False
+    corners: bool = False
+    inverted: bool = False
+    fixed: bool = False
+    ruler: RulerModel | None = None
+    targets: Annotated[list[PlaceModel], Field(min_length=1)]
+
+
+class RingsModel(StrictModel):
+    """Ring-coded targets on a carrier, or a scale bar."""
+
+    name: str
+    dot_radius_mm: float
+    bits: Literal[12, 14] = 12
+    code_distance: Literal[1, 2] = 2
+    mirror_unique: bool = True
+    complement_unique: bool = False
+    inverted: bool = False
+    fixed: bool = False
+    bar: bool = False
+    ruler: RulerModel | None = None
+    targets: Annotated[list[PlaceModel], Field(min_length=1)]
+
+
+class DistanceModel(StrictModel):
+    """A measured distance between two targets of one carrier."""
+
+    first: str
+    second: str
+    length_mm: float
+    sigma_mm: float
+
+
+class TargetsModel(StrictModel):
+    """The whole file."""
+
+    schema_: Literal["rigwright.targets/1"] = Field(alias="schema")
+    name: str
+    plates: list[PlateModel] = []
+    markers: list[MarkersModel] = []
+    rings: list[RingsModel] = []
+    distances: list[DistanceModel] = []
