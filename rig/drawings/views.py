@@ -19,9 +19,10 @@ from rig.mounts.plan import MountPlan
 from rig.mounts.structure import Member, Solid
 from rig.sight import outline
 
-SIZE_MM = 19.0
+SIZE_MM = 20.0
 """Overall sizes stand this far from what is built, beyond the ordinates of members."""
 
+SHORT_MM = 3.0
 NEAR_MM, FAR_MM = 6.0, 12.0
 NAMES_MM = 2.0
 TITLE_MM = 24.0
@@ -150,9 +151,13 @@ def _dimensioned(
 def _size(built: _Built, axis: int) -> Dimension:
     """The overall size along an axis of a view, beyond the ordinates."""
     (left, low), (right, high) = built.low_mm, built.high_mm
+    # Its lines begin beyond the ordinates, whose figures they would cross.
+    near = SIZE_MM - SHORT_MM
     if axis == 0:
-        return Dimension((left, high), (right, high), high + SIZE_MM, False, built.size_words[0])
-    return Dimension((right, low), (right, high), right + SIZE_MM + 1.0, True, built.size_words[1])
+        ends = (left, high + near), (right, high + near)
+        return Dimension(*ends, high + SIZE_MM, False, built.size_words[0])
+    ends = (right + near, low), (right + near, high)
+    return Dimension(*ends, right + SIZE_MM, True, built.size_words[1])
 
 
 def _row(

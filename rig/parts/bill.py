@@ -33,6 +33,7 @@ DENSITIES_G_PER_CM3: Mapping[str, float] = {
 """Usual densities; a material is looked up by its first word."""
 
 METRE_MM = 1000.0
+KINDS = ("camera", "lens", "mount", "head", "profile", "bracket", "fastener")
 
 
 @dataclass(frozen=True)
@@ -113,10 +114,9 @@ def bill_of_materials(
     lines = [
         *_cameras(plan, catalogue, priced),
         *_profiles(plan, catalogue, priced),
-        *_pieces((part.part for part in plan.structure.parts), catalogue, priced),
+        *_pieces(plan, catalogue, priced),
         *(_plate_line(plate, priced) for plate in plan.structure.plates),
         *_wedges(plan, wedge_volumes_mm3 or {}, priced),
-        *_fasteners(plan, catalogue, priced),
     ]
     return Bill(tuple(lines), priced.currency)
 
@@ -198,12 +198,9 @@ def _profiles(plan: MountPlan, catalogue: Catalogue, prices: Prices) -> list[Bil
     return lines
 
 
-def _pieces(parts: Iterable[str], catalogue: Catalogue, prices: Prices) -> list[BillLine]:
-    return _counted(Counter(parts), catalogue, prices)
-
-
-def _fasteners(plan: MountPlan, catalogue: Catalogue, prices: Prices) -> list[BillLine]:
-    counts: Counter[str] = Counter()
+def _pieces(plan: MountPlan, catalogue: Catalogue, prices: Prices) -> list[BillLine]:
+    """Placed parts, and what joints are made with: brackets, screws, nuts."""
+    counts = Counter(part.part for part in plan.structure.parts)
     for joint in plan.structure.joints:
         counts.update(joint.fasteners)
     return _counted(counts, catalogue, prices)
@@ -215,7 +212,7 @@ def _counted(counts: Counter[str], catalogue: Catalogue, prices: Prices) -> list
         kind, part = catalogue.find(wanted)
         mass: Any = getattr(part, "mass_g", None)
         lines.append(_line(kind, (part.id, part.name, part.maker), count, mass, prices))
-    return lines
+    return sorted(lines, key=lambda line: (KINDS.index(line.kind), line.part))
 
 
 def _plate_line(plate: Plate, prices: Prices) -> BillLine:
