@@ -58,15 +58,18 @@ def check(wedge: Wedge) -> trimesh.Trimesh:
     return mesh
 
 
-@settings(max_examples=15, deadline=None)
-@given(
-    angle(35.0), angle(35.0), angle(180.0), st.sampled_from(["through", "tapped", "countersunk"])
-)
+# The recess behind the camera screw leaves the base up to 24 mm * tan(25 deg) + 5 mm from its
+# middle, short of the heads 28 mm from it; seats that lean more do so across the line of holes.
+LITTLE = st.tuples(angle(18.0), angle(18.0), angle(180.0))
+MUCH = st.tuples(angle(50.0), angle(5.0), st.just(0.0))
+
+
+@settings(max_examples=16, deadline=None)
+@given(LITTLE | MUCH, st.sampled_from(["through", "tapped", "countersunk"]))
 def test_every_wedge_is_closed_prints_without_support_and_holds_its_angles(
-    about_x: float, about_y: float, about_z: float, kind: str
+    turns_deg: tuple[float, float, float], kind: str
 ) -> None:
-    # High enough for a seat that leans by 50 degrees about both axes together.
-    aim = Aim("cam07", 0.0, 0.0, 42.0, (about_x, about_y, about_z))
+    aim = Aim("cam07", 0.0, 0.0, 30.0, turns_deg)
     wedge = wedge_of(aim, HERE, kind=kind)
     part, mesh = print_part(wedge, CATALOGUE), check(wedge)
     print_from_rig = np.linalg.inv(part.rig_from_print)
