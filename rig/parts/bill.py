@@ -108,9 +108,9 @@ def bill_of_materials(
     """The bill of a plan. Cameras that are ``fixed`` are there already and are not counted.
 
     ``wedge_volumes_mm3`` by the wedge's id gives printed wedges their mass.
-    :class:`NotFoundError` for a part that is not in the catalogue.
+    :class:`NotFoundError` for a part or a price's id that is not in the catalogue.
     """
-    priced = prices or Prices()
+    priced = _resolved(prices or Prices(), plan, catalogue)
     lines = [
         *_cameras(plan, catalogue, priced),
         *_profiles(plan, catalogue, priced),
@@ -119,6 +119,14 @@ def bill_of_materials(
         *_wedges(plan, wedge_volumes_mm3 or {}, priced),
     ]
     return Bill(tuple(lines), priced.currency)
+
+
+def _resolved(prices: Prices, plan: MountPlan, catalogue: Catalogue) -> Prices:
+    """Prices by id; a misspelt id would else leave its price out without a word."""
+    own = {m.camera.camera.name for m in plan.mounts}
+    own |= {p.id for p in plan.structure.plates} | {w.id for w in plan.structure.wedges}
+    each = {k if k in own else catalogue.find(k)[1].id: v for k, v in prices.each.items()}
+    return Prices(prices.currency, each)
 
 
 def _line(

@@ -149,3 +149,19 @@ def test_steps_are_numbered_once() -> None:
     numbered = replace(tslot_plan(2), steps=("1. Cut.", "2. Join."))
     text = plan_files(numbered)["steps.txt"].make().decode()
     assert "1. Cut.\n2. Join.\n" in text and "1. 1." not in text
+
+
+def test_the_docs_name_every_kind_of_file() -> None:
+    text = (Path(__file__).resolve().parents[2] / "docs/drawings.md").read_text("utf-8")
+    for name in (*plan_files(plate(), PlanOptions(step=True)), MANIFEST):
+        folder, _, file = name.rpartition("/")
+        stem, _, ending = file.rpartition(".")
+        kinds = {"sheet-": "sheet-CAMERA", "wedge-": "WEDGE", "plate-": "plate-ID"}
+        shown = next((v for k, v in kinds.items() if stem.startswith(k)), stem)
+        shown += "-template" if stem.endswith("-template") else ""
+        prefix = f"{folder}/" if folder else ""
+        wanted = (f"`{prefix}{shown}.{ending}`", f"`{prefix}{shown}.*`", f"`{shown}.{ending}`")
+        known = any(word in text for word in wanted) or (
+            shown == "WEDGE" and f"`.{ending}`" in text
+        )
+        assert known, name

@@ -111,6 +111,8 @@ def test_unknown_parts_and_prices_are_refused(tslot: MountPlan) -> None:
     plan = replace(tslot, structure=replace(tslot.structure, parts=(odd,)))
     with pytest.raises(NotFoundError, match="generic-ball-25"):
         bill_of_materials(plan, CATALOGUE)
+    with pytest.raises(NotFoundError, match="corner-2020"):
+        bill_of_materials(tslot, CATALOGUE, Prices("EUR", {"corner-202": 1.0}))
     with pytest.raises(InputError, match="zero or more"):
         Prices("EUR", {"2020": float("nan")})
 
