@@ -6,6 +6,7 @@ from rig.drawings.lists import poses_csv, settings_csv, tapes_csv
 from rig.drawings.pdf import pdf_bytes
 from rig.drawings.plates import plate_sheets
 from rig.drawings.settingsheet import setting_sheets
+from rig.drawings.steps import plain_steps, steps_text
 from rig.drawings.svg import svg_bytes
 from rig.drawings.templates import template_pages, template_sheet
 from rig.drawings.views import view_sheets
@@ -14,10 +15,12 @@ __all__ = [
     "Sheet",
     "dxf_bytes",
     "pdf_bytes",
+    "plain_steps",
     "plate_sheets",
     "poses_csv",
     "setting_sheets",
     "settings_csv",
+    "steps_text",
     "svg_bytes",
     "tapes_csv",
     "template_pages",

@@ -52,18 +52,18 @@ def plate_sheets(plan_name: str, plate: Plate) -> tuple[Sheet, ...]:
     Coordinates count from the lower left corner of the plate's box.
     """
     size = np.ptp(plate.outline_mm, axis=0)
-    n = _denominator(size)
+    holes = Table("Holes, from the lower left corner", HOLE_COLUMNS, hole_rows(plate))
+    top = A3_LANDSCAPE_MM[1] - MARGIN_MM - 6.0
+    beside = holes.height_mm() <= top - (MARGIN_MM + BLOCK_MM[1] + 6.0)
+    n = _denominator(size, TABLE_SHARE_MM if beside else 0.0)
     base = np.array([MARGIN_MM + EDGE_MM, MARGIN_MM + BLOCK_MM[1] + EDGE_MM])
     drawing = plate_drawing(plate, base, n)
     items = [*plate_shape(drawing), *_numbers(drawing), *_dimensioned(drawing)]
     words = f"{plate.material}, {plate.thickness_mm:g} mm thick; seen from the cameras' side"
-    top = A3_LANDSCAPE_MM[1] - MARGIN_MM - 6.0
     items.append(Text(words, MARGIN_MM + 5.0, top - 3.0, 2.6, bold=True))
-    holes = Table("Holes, from the lower left corner", HOLE_COLUMNS, hole_rows(plate))
-    room = top - (MARGIN_MM + BLOCK_MM[1] + 6.0)
     left = A3_LANDSCAPE_MM[0] - MARGIN_MM - TABLE_SHARE_MM
     more: list[Content] = []
-    if holes.height_mm() <= room:
+    if beside:
         items += table_items(holes, left, top, TABLE_SHARE_MM - 5.0)
     else:
         more = table_sheets([holes], f"Plate {plate.id}: holes", A3_LANDSCAPE_MM)
@@ -88,8 +88,8 @@ def hole_rows(plate: Plate) -> tuple[tuple[str, ...], ...]:
     )
 
 
-def _denominator(size: Floats) -> float:
-    across = A3_LANDSCAPE_MM[0] - 2.0 * MARGIN_MM - 2.0 * EDGE_MM - TABLE_SHARE_MM
+def _denominator(size: Floats, table_mm: float) -> float:
+    across = A3_LANDSCAPE_MM[0] - 2.0 * MARGIN_MM - 2.0 * EDGE_MM - table_mm
     upwards = A3_LANDSCAPE_MM[1] - 2.0 * MARGIN_MM - BLOCK_MM[1] - 2.0 * EDGE_MM
     for n in DENOMINATORS:
         if size[0] / n <= across and size[1] / n <= upwards:

@@ -19,11 +19,13 @@ from rig.mounts.plan import MountPlan
 from rig.mounts.structure import Member, Solid
 from rig.sight import outline
 
-SIZE_MM = 19.0
+SIZE_MM = 20.0
 """Overall sizes stand this far from what is built, beyond the ordinates of members."""
 
+SHORT_MM = 3.0
 NEAR_MM, FAR_MM = 6.0, 12.0
-NAMES_MM = 2.0
+NAMES_MM, CROWD_NAMES_MM = 2.0, 1.6
+MANY = 40
 TITLE_MM = 24.0
 AXIS_SHARE = 0.35
 """Optical axes are drawn this far of the way to the focus."""
@@ -59,8 +61,10 @@ def view_sheets(plan: MountPlan, subject_mm: Floats | None = None) -> tuple[Shee
     everything = np.concatenate(points)
     views = arranged(everything.min(axis=0), everything.max(axis=0))
     items: list[Item] = []
+    named = _named(views, plan)
     for view in views:
         items += _drawn(view, plan, solids, subject_mm)
+        items += _cameras(view, plan, named=view in named)
     items += _dimensioned(views, plan, solids)
     poses = Table("Cameras, optical centre from the datum", POSE_COLUMNS, _pose_rows(plan))
     tables = [poses, *_structure_tables(plan)]
@@ -88,20 +92,35 @@ def _drawn(
         Line(np.array([[x - 3, y], [x + 3, y]]), "datum"),
         Line(np.array([[x, y - 3], [x, y + 3]]), "datum"),
     ]
-    labels = Labels()
     title_x, title_y = view.origin_mm[0], view.origin_mm[1] + view.size_mm[1] + TITLE_MM
-    items += _cameras(view, plan, labels)
-    items += labels.place("datum", float(x), float(y), NAMES_MM, "datum")
     return [*items, Text(view.view.title, float(title_x), float(title_y), 2.6, bold=True)]
 
 
-def _cameras(view: Placed, plan: MountPlan, labels: Labels) -> list[Item]:
-    """Marks at the optical centres, the optical axes, and the names."""
+def _named(views: tuple[Placed, Placed, Placed], plan: MountPlan) -> tuple[Placed, ...]:
+    """The views that name the cameras: of many cameras only the one that spreads them most."""
+    if len(plan.mounts) <= MANY:
+        return views
+    centres = np.array([m.camera.pose.position_rig_mm for m in plan.mounts])
+
+    def spread(view: Placed) -> float:
+        return float(np.ptp(view.paper(centres), axis=0).prod())
+
+    return (max(views, key=spread),)
+
+
+def _cameras(view: Placed, plan: MountPlan, *, named: bool) -> list[Item]:
+    """Marks at the optical centres, the optical axes, the names, and the datum's."""
     items: list[Item] = []
+    labels, many = Labels(), len(plan.mounts) > MANY
     centres = view.paper(np.array([m.camera.pose.position_rig_mm for m in plan.mounts]))
-    for mount in plan.mounts:
+    for mount, centre in zip(plan.mounts, centres, strict=True):
         corners = view.paper(np.concatenate(place_body(mount.camera).parts))
-        labels.keep_off(corners.min(axis=0), corners.max(axis=0))
+        # Among many cameras names find room only on the bodies.
+        low, high = (centre - 0.8, centre + 0.8) if many else (corners.min(0), corners.max(0))
+        labels.keep_off(low, high)
+    datum = view.paper(plan.datum_rig_mm[None])[0]
+    items += labels.place("datum", float(datum[0]), float(datum[1]), NAMES_MM, "datum")
+    size = CROWD_NAMES_MM if many else NAMES_MM
     for mount, (x, y) in zip(plan.mounts, centres, strict=True):
         camera = mount.camera
         reach = AXIS_SHARE * camera.focus_distance_mm
@@ -109,7 +128,8 @@ def _cameras(view: Placed, plan: MountPlan, labels: Labels) -> list[Item]:
         items.append(Line(np.array([[x, y], end]), "axis"))
         figures = tuple(zip(TAGS, pose_figures(camera, plan.datum_rig_mm)[1:], strict=True))
         items.append(CameraMark(mount.name, float(x), float(y), figures))
-        items += labels.place(mount.name, float(x), float(y), NAMES_MM, "camera")
+        if named:
+            items += labels.place(mount.name, float(x), float(y), size, "camera")
     return items
 
 
@@ -150,9 +170,13 @@ def _dimensioned(
 def _size(built: _Built, axis: int) -> Dimension:
     """The overall size along an axis of a view, beyond the ordinates."""
     (left, low), (right, high) = built.low_mm, built.high_mm
+    # Its lines begin beyond the ordinates, whose figures they would cross.
+    near = SIZE_MM - SHORT_MM
     if axis == 0:
-        return Dimension((left, high), (right, high), high + SIZE_MM, False, built.size_words[0])
-    return Dimension((right, low), (right, high), right + SIZE_MM + 1.0, True, built.size_words[1])
+        ends = (left, high + near), (right, high + near)
+        return Dimension(*ends, high + SIZE_MM, False, built.size_words[0])
+    ends = (right + near, low), (right + near, high)
+    return Dimension(*ends, right + SIZE_MM, True, built.size_words[1])
 
 
 def _row(

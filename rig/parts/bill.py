@@ -33,6 +33,7 @@ DENSITIES_G_PER_CM3: Mapping[str, float] = {
 """Usual densities; a material is looked up by its first word."""
 
 METRE_MM = 1000.0
+KINDS = ("camera", "lens", "mount", "head", "profile", "bracket", "fastener")
 
 
 @dataclass(frozen=True)
@@ -107,18 +108,25 @@ def bill_of_materials(
     """The bill of a plan. Cameras that are ``fixed`` are there already and are not counted.
 
     ``wedge_volumes_mm3`` by the wedge's id gives printed wedges their mass.
-    :class:`NotFoundError` for a part that is not in the catalogue.
+    :class:`NotFoundError` for a part or a price's id that is not in the catalogue.
     """
-    priced = prices or Prices()
+    priced = _resolved(prices or Prices(), plan, catalogue)
     lines = [
         *_cameras(plan, catalogue, priced),
         *_profiles(plan, catalogue, priced),
-        *_pieces((part.part for part in plan.structure.parts), catalogue, priced),
+        *_pieces(plan, catalogue, priced),
         *(_plate_line(plate, priced) for plate in plan.structure.plates),
         *_wedges(plan, wedge_volumes_mm3 or {}, priced),
-        *_fasteners(plan, catalogue, priced),
     ]
     return Bill(tuple(lines), priced.currency)
+
+
+def _resolved(prices: Prices, plan: MountPlan, catalogue: Catalogue) -> Prices:
+    """Prices by id; a misspelt id would else leave its price out without a word."""
+    own = {m.camera.camera.name for m in plan.mounts}
+    own |= {p.id for p in plan.structure.plates} | {w.id for w in plan.structure.wedges}
+    each = {k if k in own else catalogue.find(k)[1].id: v for k, v in prices.each.items()}
+    return Prices(prices.currency, each)
 
 
 def _line(
@@ -198,12 +206,9 @@ def _profiles(plan: MountPlan, catalogue: Catalogue, prices: Prices) -> list[Bil
     return lines
 
 
-def _pieces(parts: Iterable[str], catalogue: Catalogue, prices: Prices) -> list[BillLine]:
-    return _counted(Counter(parts), catalogue, prices)
-
-
-def _fasteners(plan: MountPlan, catalogue: Catalogue, prices: Prices) -> list[BillLine]:
-    counts: Counter[str] = Counter()
+def _pieces(plan: MountPlan, catalogue: Catalogue, prices: Prices) -> list[BillLine]:
+    """Placed parts, and what joints are made with: brackets, screws, nuts."""
+    counts = Counter(part.part for part in plan.structure.parts)
     for joint in plan.structure.joints:
         counts.update(joint.fasteners)
     return _counted(counts, catalogue, prices)
@@ -215,7 +220,7 @@ def _counted(counts: Counter[str], catalogue: Catalogue, prices: Prices) -> list
         kind, part = catalogue.find(wanted)
         mass: Any = getattr(part, "mass_g", None)
         lines.append(_line(kind, (part.id, part.name, part.maker), count, mass, prices))
-    return lines
+    return sorted(lines, key=lambda line: (KINDS.index(line.kind), line.part))
 
 
 def _plate_line(plate: Plate, prices: Prices) -> BillLine:

@@ -47,7 +47,7 @@ JOINT_COLUMNS = (
     "z_mm",
     "fasteners",
 )
-LISTED = " "
+LISTED = "; "
 """Stands between ids in one cell."""
 
 

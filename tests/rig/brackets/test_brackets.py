@@ -16,6 +16,7 @@ from plans import AIMS, Aim, frame, wedge_of
 
 from geometry.errors import InputError
 from rig.brackets import (
+    PrintPart,
     bracket_3mf,
     bracket_mesh,
     bracket_step,
@@ -47,7 +48,7 @@ def area_on_plane(mesh: trimesh.Trimesh, point: np.ndarray, normal: np.ndarray) 
     return float(mesh.area_faces[near[mesh.faces].all(axis=1) & facing].sum())
 
 
-def check(wedge: Wedge) -> trimesh.Trimesh:
+def check(wedge: Wedge) -> tuple[PrintPart, trimesh.Trimesh]:
     part = print_part(wedge, CATALOGUE)
     mesh = bracket_mesh(part)
     assert mesh.is_watertight and mesh.is_winding_consistent
@@ -55,20 +56,23 @@ def check(wedge: Wedge) -> trimesh.Trimesh:
     assert mesh.bounds[0][2] == pytest.approx(0.0, abs=1e-9)
     hull = trimesh.convex.convex_hull(part.corners_mm)
     assert 0.5 * hull.volume < mesh.volume < 0.99 * hull.volume
-    return mesh
+    return part, mesh
 
 
-@settings(max_examples=15, deadline=None)
-@given(
-    angle(35.0), angle(35.0), angle(180.0), st.sampled_from(["through", "tapped", "countersunk"])
-)
+# The recess behind the camera screw leaves the base up to 24 mm * tan(25 deg) + 5 mm from its
+# middle, short of the heads 28 mm from it; seats that lean more do so across the line of holes.
+LITTLE = st.tuples(angle(18.0), angle(18.0), angle(180.0))
+MUCH = st.tuples(angle(50.0), angle(5.0), st.just(0.0))
+
+
+@settings(max_examples=8, deadline=None)
+@given(LITTLE | MUCH, st.sampled_from(["through", "tapped", "countersunk"]))
 def test_every_wedge_is_closed_prints_without_support_and_holds_its_angles(
-    about_x: float, about_y: float, about_z: float, kind: str
+    turns_deg: tuple[float, float, float], kind: str
 ) -> None:
-    # High enough for a seat that leans by 50 degrees about both axes together.
-    aim = Aim("cam07", 0.0, 0.0, 42.0, (about_x, about_y, about_z))
+    aim = Aim("cam07", 0.0, 0.0, 30.0, turns_deg)
     wedge = wedge_of(aim, HERE, kind=kind)
-    part, mesh = print_part(wedge, CATALOGUE), check(wedge)
+    part, mesh = check(wedge)
     print_from_rig = np.linalg.inv(part.rig_from_print)
     seat = print_from_rig @ wedge.rig_from_base @ wedge.base_from_seat
     hole = np.pi * (wedge.screw_hole_mm / 2.0) ** 2 * 1.2

@@ -124,6 +124,14 @@ def test_equal_plans_give_equal_files_in_another_process() -> None:
     assert len(runs) == 1
 
 
+def test_many_cameras_are_named_in_one_view_only() -> None:
+    sheet = view_sheets(tslot_plan(41))[0]
+    words = [i.words for i in sheet.items if isinstance(i, Text)]
+    assert all(words.count(f"c{k}") == 1 for k in range(1, 42))
+    few = view_sheets(tslot_plan(12))[0]
+    assert [i.words for i in few.items if isinstance(i, Text)].count("c3") == 4, "and the table"
+
+
 def test_dimensions_in_dxf_measure_what_they_say() -> None:
     document = read.read_dxf(dxf_bytes(view_sheets(tslot_plan(5))))
     found = list(document.modelspace().query("DIMENSION"))

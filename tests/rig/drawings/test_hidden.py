@@ -49,7 +49,7 @@ def test_a_round_lens_shows_only_its_ends_and_outline() -> None:
     assert abs(total(lines) - (2 * 10.0 + 2 * 10.0)) < 0.5
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(st.integers(0, 10_000))
 def test_what_is_drawn_is_what_rays_see(seed: int) -> None:
     rng = np.random.default_rng(seed)

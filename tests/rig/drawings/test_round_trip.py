@@ -9,6 +9,7 @@ import numpy as np
 import plan_readers as read
 import pytest
 from plans import plate_plan, tslot_plan
+from rigs import face, face_cameras, face_limits
 
 from rig.drawings import (
     dxf_bytes,
@@ -23,7 +24,9 @@ from rig.drawings import (
     template_sheet,
     view_sheets,
 )
+from rig.mounts.making import make_plan
 from rig.mounts.plan import MountPlan
+from rig.mounts.systemfile import parse_system
 
 POSITION_MM = 0.05 + 1e-9
 """Half of the 0.1 mm that lengths are stated to, along each axis."""
@@ -50,6 +53,10 @@ def check(plan: MountPlan, found: dict[str, read.ReadPose]) -> None:
 
 
 def test_views_as_pdf_and_svg(plan: MountPlan) -> None:
+    check_words_of_views(plan)
+
+
+def check_words_of_views(plan: MountPlan) -> None:
     sheets = view_sheets(plan)
     for pages in (read.pdf_lines(pdf_bytes(sheets, "x")), read.svg_lines(svg_bytes(sheets, "x"))):
         assert len(pages) == len(sheets)
@@ -57,6 +64,10 @@ def test_views_as_pdf_and_svg(plan: MountPlan) -> None:
 
 
 def test_views_as_dxf(plan: MountPlan) -> None:
+    check_dxf_of_views(plan)
+
+
+def check_dxf_of_views(plan: MountPlan) -> None:
     document = read.read_dxf(dxf_bytes(view_sheets(plan)))
     check(plan, read.poses_in(read.dxf_lines(document)))
     attributes = read.dxf_attributes(document)
@@ -86,7 +97,10 @@ def settings_agree(plan: MountPlan, index: int, lines: list[str]) -> None:
 
 @pytest.mark.parametrize("name", ["t-slot", "plate"])
 def test_setting_sheets(name: str) -> None:
-    plan = PLANS[name]
+    check_setting_sheets(PLANS[name])
+
+
+def check_setting_sheets(plan: MountPlan) -> None:
     sheets = setting_sheets(plan)
     pdf, svg = read.pdf_lines(pdf_bytes(sheets, "x")), read.svg_lines(svg_bytes(sheets, "x"))
     assert len(sheets) == len(pdf) == len(svg) == len(plan.mounts)
@@ -105,6 +119,10 @@ def test_setting_sheets(name: str) -> None:
 
 
 def test_lists(plan: MountPlan) -> None:
+    check_lists(plan)
+
+
+def check_lists(plan: MountPlan) -> None:
     rows = csv.reader(io.StringIO(poses_csv(plan)))
     check(plan, read.poses_in([" ".join(row) for row in rows]))
     settings = list(csv.DictReader(io.StringIO(settings_csv(plan))))
@@ -149,3 +167,12 @@ def test_holes_of_a_plate_from_its_tiled_template(paper: str) -> None:
     near = np.abs(found[:, None] - wanted[None]).max(axis=2) < 0.13 + 0.05
     assert near.any(axis=1).all() and near.any(axis=0).all()
     assert len(pages) == {"A4": 4, "A3": 2}[paper]
+
+
+@pytest.mark.slow
+def test_a_plan_made_from_a_design() -> None:
+    subject, limits = face(), face_limits()
+    cameras = face_cameras(subject, 4)
+    plan = make_plan(cameras, subject, limits, parse_system('kind = "t-slot"'), trials=2)
+    for read_back in (check_words_of_views, check_dxf_of_views, check_setting_sheets, check_lists):
+        read_back(plan)

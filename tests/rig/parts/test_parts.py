@@ -111,6 +111,8 @@ def test_unknown_parts_and_prices_are_refused(tslot: MountPlan) -> None:
     plan = replace(tslot, structure=replace(tslot.structure, parts=(odd,)))
     with pytest.raises(NotFoundError, match="generic-ball-25"):
         bill_of_materials(plan, CATALOGUE)
+    with pytest.raises(NotFoundError, match="corner-2020"):
+        bill_of_materials(tslot, CATALOGUE, Prices("EUR", {"corner-202": 1.0}))
     with pytest.raises(InputError, match="zero or more"):
         Prices("EUR", {"2020": float("nan")})
 
@@ -124,7 +126,7 @@ def test_the_cut_list_groups_equal_lengths(tslot: MountPlan) -> None:
         ("arm", 80.0, 1),
     ]
     table = rows(cuts_csv(cuts))
-    assert table[0]["members"] == "upright-c1 upright-c2" and table[0]["length_mm"] == "1200.0"
+    assert table[0]["members"] == "upright-c1; upright-c2" and table[0]["length_mm"] == "1200.0"
     assert json.loads(cuts_json(cuts))["cuts"][0]["members"] == ["upright-c1", "upright-c2"]
     assert sum(int(r["quantity"]) for r in table) == len(tslot.structure.members)
 
@@ -142,7 +144,7 @@ def test_a_bent_member_is_cut_to_its_arc(tslot: MountPlan) -> None:
 def test_joints_say_where_to_mark_the_member(tslot: MountPlan) -> None:
     table = {row["joint"]: row for row in rows(joints_csv(tslot))}
     assert table["joint-c1"]["along_mm"] == "560.0" and table["joint-c1"]["angle_deg"] == ""
-    assert table["joint-c1"]["fasteners"] == "2xcap-screw-m5 2xt-nut-2020"
+    assert table["joint-c1"]["fasteners"] == "2xcap-screw-m5; 2xt-nut-2020"
     document = json.loads(joints_json(tslot))["joints"]
     assert [j["joint"] for j in document] == list(table)
 
