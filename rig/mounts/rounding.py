@@ -73,6 +73,8 @@ class Rounder:
 
     def relax(self, loss: Callable[[tuple[RigCamera, ...]], float], most: float) -> float:
         """Draw the limits in as far as costs at most ``most`` of ``loss``; the share drawn in."""
+        for k, mount in enumerate(self.mounts):
+            self._set(k, mount)
         at = tuple(self.mounts)
         linear = self._linear(margins=True)
         for share in SHARES:
