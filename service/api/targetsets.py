@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Response
 from pydantic import AwareDatetime, Field
 
-from calibration.targets.files import TargetsModel, read_targets, targets_of, targets_text
+from calibration.targets.filekeys import TargetsModel
+from calibration.targets.files import read_targets, targets_of, targets_text
 from calibration.targets.kinds import TargetPlan
 from geometry.errors import NotFoundError
 from service.api.context import Service, ServiceDep
+from service.api.designs import resource as designs
 from service.api.models import Cursor, Limit, Model, problems
+from service.measuring.proposing import proposal_figures, proposal_for
 from service.measuring.sheets import sheets_of
 from service.store.documents import DocumentRecord
 
@@ -40,6 +44,29 @@ class TargetSetPage(Model):
 
     items: list[TargetSet]
     next: int | None
+
+
+class ProposalRequest(Model):
+    """Whom to propose targets for."""
+
+    design_id: Annotated[str, Field(min_length=1, max_length=100)]
+
+
+class SeenByCamera(Model):
+    """What a camera sees of the targets that stand round the subject."""
+
+    camera: str
+    targets: int
+    cells: Annotated[int, Field(description="In how many ninths of its picture.")]
+    radius_px: Annotated[list[float], Field(description="Smallest and largest of their dots.")]
+
+
+class ProposedTargets(Model):
+    """A target set for a rig, and what its cameras see of it."""
+
+    target_set: TargetSet
+    cameras: list[SeenByCamera]
+    notes: list[str]
 
 
 class SheetEntry(Model):
@@ -90,6 +117,20 @@ def add_target_set(request: TargetsModel, response: Response, service: ServiceDe
     response.status_code = 201 if new else 200
     response.headers["Location"] = f"{PATH}/{record.id}"
     return _document(record)
+
+
+@router.post(
+    PATH + "/proposals",
+    status_code=201,
+    response_model=ProposedTargets,
+    responses=problems(400, 404, 409, 413, 422, 507),
+)
+def propose(request: ProposalRequest, response: Response, service: ServiceDep) -> JSON:
+    """Add a target set that suits a design: sizes, numbers and places for its cameras."""
+    proposal = proposal_for(Path(designs.file(service, request.design_id, "design.json").path))
+    record, _ = keep_targets(service, proposal.plan)
+    response.headers["Location"] = f"{PATH}/{record.id}"
+    return {"target_set": _document(record), **proposal_figures(proposal)}
 
 
 @router.get(PATH, response_model=TargetSetPage, responses=problems(422))

@@ -42,6 +42,22 @@ def print_targets(result: JSON) -> None:
     for row in result["carriers"]:
         table.add_row(escape(row["name"]), row["kind"], str(row["targets"]))
     Console().print(table)
+    if result["cameras"]:
+        seen = Table(
+            *("Camera", "Sees targets", "In ninths of its picture", "Radius of dots px"),
+            title="What each camera sees of the stand",
+            title_justify="left",
+        )
+        for row in result["cameras"]:
+            low, high = row["radius_px"]
+            seen.add_row(
+                escape(row["camera"]),
+                str(row["targets"]),
+                str(row["cells"]),
+                f"{_number(low, 1)} to {_number(high, 1)}",
+            )
+        Console().print(seen)
+    _say(*(f"note: {note}" for note in result["notes"]))
 
 
 def print_calibration(result: JSON) -> None:

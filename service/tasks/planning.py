@@ -6,8 +6,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from rig.planfolder import PlanOptions, write_plan
-
 from geometry.errors import InputError
 from geometry.preparation import prepare_subject
 from geometry.reading import read_scan
@@ -17,6 +15,8 @@ from rig.mounts.making import make_plan
 from rig.mounts.plan import MountPlan
 from rig.mounts.systemfile import read_system, system_from_mapping
 from rig.parts import Prices
+from rig.planfiles import PlanOptions
+from rig.planfolder import write_plan
 from service.wire import plain
 from solver.progress import CancelToken, Progress, ProgressCallback
 

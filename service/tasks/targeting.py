@@ -9,6 +9,7 @@ from typing import Any
 from calibration.targets.files import read_targets, write_targets
 from calibration.targets.kinds import TargetPlan
 from geometry.errors import CancelledError
+from service.measuring.proposing import proposal_figures, proposal_for
 from service.measuring.sheets import sheets_of
 from solver.progress import CancelToken, Progress, ProgressCallback
 
@@ -23,7 +24,12 @@ def targets(
     cancel: CancelToken,
 ) -> JSON:
     """Write ``targets.toml`` and every sheet of the set given, or of one for the design given."""
-    plan = read_targets(inputs["targets"])
+    proposed: JSON = {"cameras": [], "notes": []}
+    if "design" in inputs:
+        proposal = proposal_for(inputs["design"])
+        plan, proposed = proposal.plan, proposal_figures(proposal)
+    else:
+        plan = read_targets(inputs["targets"])
     write_targets(plan, folder / "targets.toml")
     sheets = sheets_of(plan, request["page"])
     for number, sheet in enumerate(sheets.values()):
@@ -32,7 +38,7 @@ def targets(
         report(Progress(f"drawing {sheet.name}", number / len(sheets)))
         (folder / sheet.name).write_bytes(sheet.make())
     report(Progress("done", 1.0))
-    return {"name": plan.name, "carriers": _carriers(plan)}
+    return {"name": plan.name, "carriers": _carriers(plan), **proposed}
 
 
 def _carriers(plan: TargetPlan) -> list[JSON]:

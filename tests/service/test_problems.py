@@ -196,7 +196,15 @@ def test_the_guide_lists_no_error_that_cannot_come() -> None:
 
 LIKE_DESIGNS = tuple(
     f"/v1/{name}/{{id}}/"
-    for name in ("captures", "rig-tests", "evaluations", "calibrations", "checks", "acceptances")
+    for name in (
+        "captures",
+        "rig-tests",
+        "evaluations",
+        "plans",
+        "calibrations",
+        "checks",
+        "acceptances",
+    )
 )
 """What is below these is said to be as it is below designs."""
 
