@@ -2,11 +2,23 @@
 
 from __future__ import annotations
 
+import csv
+import io
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+import numpy as np
+
+from calibration.targets.drawing import Drawing
 from calibration.targets.faces import carrier_face
-from calibration.targets.kinds import CarrierKind, TargetPlan
+from calibration.targets.kinds import (
+    CarrierKind,
+    CharucoPlate,
+    MarkerCarrier,
+    Place,
+    RingCarrier,
+    TargetPlan,
+)
 from calibration.targets.printing import carrier_drawings, to_pdf, to_svg
 from geometry.errors import InputError
 from service.store.scans import plain_name
@@ -31,11 +43,12 @@ def sheets_of(plan: TargetPlan, page: str = "A4") -> Mapping[str, Sheet]:
     for carrier in plan.carriers:
         sheets += _printed(carrier, page)
         sheets += _pictured(carrier)
+        sheets += _placed(carrier)
     return {sheet.name: sheet for sheet in sheets}
 
 
 def _printed(carrier: CarrierKind, page: str) -> list[Sheet]:
-    drawings = carrier_drawings(carrier, page)
+    drawings = _drawn(_laid_out(carrier), page)
     stem = _stem(carrier)
     many = len(drawings) > 1
     svgs = [
@@ -49,6 +62,39 @@ def _printed(carrier: CarrierKind, page: str) -> list[Sheet]:
     ]
     whole = lambda: to_pdf(drawings, carrier.name)  # noqa: E731 - one of the makers above
     return [Sheet(f"{stem}.pdf", carrier.name, "application/pdf", whole), *svgs]
+
+
+def _drawn(carrier: CarrierKind, page: str) -> tuple[Drawing, ...]:
+    """The pages of a carrier, turned where it does not fit upright."""
+    try:
+        return carrier_drawings(carrier, page)
+    except InputError as error:
+        if error.detail != "print-page" or page.endswith("landscape"):
+            raise
+    return carrier_drawings(carrier, f"{page} landscape")
+
+
+def _laid_out(carrier: CarrierKind) -> CarrierKind:
+    """A stand's targets one beside the other: they are cut out and put up at their places."""
+    if isinstance(carrier, CharucoPlate) or not _stands(carrier):
+        return carrier
+    return replace(carrier, places=tuple(Place(place.number) for place in carrier.places))
+
+
+def _stands(carrier: MarkerCarrier | RingCarrier) -> bool:
+    depth = np.array([place.position_mm[2] for place in carrier.places])
+    return bool(np.isfinite(depth).all() and np.ptp(depth) > 1e-6)
+
+
+def _placed(carrier: CarrierKind) -> list[Sheet]:
+    """Where the targets of a stand go, as a table."""
+    if isinstance(carrier, CharucoPlate) or not _stands(carrier):
+        return []
+    rows = [(place.number, *(f"{v:.1f}" for v in place.position_mm)) for place in carrier.places]
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows([("number", "x_mm", "y_mm", "z_mm"), *rows])
+    make = text.getvalue().encode
+    return [Sheet(f"{_stem(carrier)}-places.csv", carrier.name, "text/csv", make)]
 
 
 def _pictured(carrier: CarrierKind) -> list[Sheet]:

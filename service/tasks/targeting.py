@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from calibration.targets.files import read_targets, write_targets
-from calibration.targets.kinds import TargetPlan
+from calibration.targets.kinds import CharucoPlate, MarkerCarrier, RingCarrier, TargetPlan
 from geometry.errors import CancelledError
 from service.measuring.proposing import proposal_figures, proposal_for
 from service.measuring.sheets import sheets_of
@@ -41,7 +41,12 @@ def targets(
     return {"name": plan.name, "carriers": _carriers(plan), **proposed}
 
 
+_KINDS = {
+    CharucoPlate: "ChArUco plate",
+    MarkerCarrier: "square markers",
+    RingCarrier: "ring-coded targets",
+}
+
+
 def _carriers(plan: TargetPlan) -> list[JSON]:
-    return [
-        {"name": c.name, "kind": type(c).__name__, "targets": len(c.ids)} for c in plan.carriers
-    ]
+    return [{"name": c.name, "kind": _KINDS[type(c)], "targets": len(c.ids)} for c in plan.carriers]
