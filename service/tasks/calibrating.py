@@ -10,8 +10,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from calibration.targets.files import read_targets
-
 from calibration.acceptance import LengthLimit, Volume, accept, certificate_pdf
 from calibration.acceptance.certificate import Heading
 from calibration.adjustment import CalibratedCamera, CalibrationOptions, ReferencePoses, calibrate
@@ -27,6 +25,7 @@ from calibration.files import (
     write_calibration,
 )
 from calibration.report import calibration_page, check_page, history_of, history_page
+from calibration.targets.files import read_targets
 from rig.designfile import read_design
 from service.measuring.figures import acceptance_figures, calibration_figures, check_figures
 from service.measuring.seeing import DETECTING, see, seen_figures
