@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import argparse
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import cache
@@ -57,7 +57,7 @@ ROWS = (
     Row("one ring target knocked by 0.1 mm", trials.target_moved(100.0), ""),
 )
 NOTHING = Row("nothing but a shift and turn of the whole rig", trials.nothing, "at most 0.1 %")
-FEW = ROWS[:2]
+QUICK_ROWS = 2
 
 USUAL = "usual"
 QUICK = "quick"
@@ -85,31 +85,27 @@ def run(pool: ProcessPoolExecutor, name: str, row: int, count: int) -> trials.Ta
     return sum((w.result() for w in waiting), trials.Tally(0, 0, 0, 0, 0))
 
 
-HEAD = ("what happened", "reported", "own verdict", "named", "alone", "asked")
+HEAD = ("what happened", "trials", "reported", "own verdict", "named", "alone", "asked")
 
 
-def disturbances(pool: ProcessPoolExecutor, name: str, rows: int, count: int) -> str:
-    """A table of the first ``rows`` disturbances."""
+def disturbances(tallies: Sequence[trials.Tally]) -> str:
+    """A table of the first disturbances, as many as there are tallies."""
     lines = []
-    for number, row in enumerate(ROWS[:rows]):
-        t = run(pool, name, number, count)
+    for row, t in zip(ROWS, tallies, strict=False):
         shares = [f"{v / t.trials:.1%}" for v in (t.alarmed, t.kind, t.named, t.alone)]
-        lines.append((row.words, *shares, row.asked))
-        print(" | ".join(lines[-1]), flush=True)
+        lines.append((row.words, str(t.trials), *shares, row.asked))
     return table(HEAD, lines)
 
 
-def false_alarms(pool: ProcessPoolExecutor, name: str, count: int) -> str:
+def false_alarms(tally: trials.Tally) -> str:
     """How often an unchanged rig is not called fine, with a 95 % interval (Clopper-Pearson)."""
-    found = run(pool, name, -1, count).alarmed
+    found, count = tally.alarmed, tally.trials
     low = float(beta.ppf(0.025, found, count - found + 1)) if found else 0.0
     high = float(beta.ppf(0.975, found + 1, count - found))
-    text = (
+    return (
         f"Nothing happened but a shift and turn of the whole rig: {found} false alarms in {count}\n"
-        f"checks, {found / count:.2%} (95 % interval {low:.2%} to {high:.2%}; at most 0.1 % asked)."
+        f"checks, {found / count:.2%} (95 % interval {low:.2%} to {high:.2%}; asked: 0.1 %).\n"
     )
-    print(text, flush=True)
-    return text + "\n"
 
 
 def sensitivities() -> Iterator[tuple[str, ...]]:
@@ -130,27 +126,44 @@ def sensitivities() -> Iterator[tuple[str, ...]]:
         )
 
 
-def measured(pool: ProcessPoolExecutor, count: int, nothing: int) -> str:
+@dataclass(frozen=True)
+class Measured:
+    """Tallies of a kind of check: of the first disturbances, and of nothing."""
+
+    disturbed: tuple[trials.Tally, ...]
+    nothing: trials.Tally
+
+
+def measured(pool: ProcessPoolExecutor, name: str, rows: int, count: int, nothing: int) -> Measured:
+    """All trials of a kind of check."""
+    disturbed = []
+    for number in range(rows):
+        disturbed.append(run(pool, name, number, count))
+        print(ROWS[number].words, disturbed[-1], flush=True)
+    return Measured(tuple(disturbed), run(pool, name, -1, nothing))
+
+
+def page(usual: Measured, quick: Measured) -> str:
     """All tables."""
     about = (
-        f"{count} trials in each row, image noise {SIGMA_PX} px. Every trial draws a reference "
-        "from\nits covariance (so that its own uncertainty is in the test), disturbs the rig, "
-        "observes it and\nruns the check as shipped. Reported: the light is not green. Own "
-        "verdict: the right kind is\namong the findings. Named: about exactly the right cameras "
-        "or targets. Alone: and nothing else\nwas found.\n"
+        f"Image noise {SIGMA_PX} px. Every trial draws a reference from its covariance (so that "
+        "its own\nuncertainty is in the test), disturbs the rig, observes it and runs the check as "
+        "shipped. Reported:\nthe light is not green. Own verdict: the right kind is among the "
+        "findings. Named: about exactly\nthe right cameras or targets. Alone: and nothing else "
+        "was found.\n"
     )
-    usual, quick = (len(bench(name).epoch.pixel) for name in (USUAL, QUICK))
+    points = [len(bench(name).epoch.pixel) for name in (USUAL, QUICK)]
     head = ("check", "turn across the view", "roll", "shift across", "along")
     return "\n".join(
         [
             about,
             f"Usual check: 60 ring targets and the plate in {trials.CHECK_FRAMES} frames "
-            f"({usual} image points).\n",
-            disturbances(pool, USUAL, len(ROWS), count),
-            false_alarms(pool, USUAL, nothing),
-            f"Quick check: one picture of 40 ring targets ({quick} image points).\n",
-            disturbances(pool, QUICK, len(FEW), count),
-            false_alarms(pool, QUICK, nothing),
+            f"({points[0]} image points).\n",
+            disturbances(usual.disturbed),
+            false_alarms(usual.nothing),
+            f"Quick check: one picture of 40 ring targets ({points[1]} image points).\n",
+            disturbances(quick.disturbed),
+            false_alarms(quick.nothing),
             "What the checks could have seen (Baarda, delta0 = 4.13), median over the cameras; "
             "`factor` times\nas much is reported in 95 of 100 checks.\n",
             table((*head, "hidden at the subject", "factor"), list(sensitivities())),
@@ -167,7 +180,9 @@ def main() -> None:
     parser.add_argument("--write", type=Path, help="page whose tables are replaced")
     given = parser.parse_args()
     with ProcessPoolExecutor(given.processes) as pool:
-        text = measured(pool, given.trials, given.nothing)
+        usual = measured(pool, USUAL, len(ROWS), given.trials, given.nothing)
+        quick = measured(pool, QUICK, QUICK_ROWS, given.trials, given.nothing)
+    text = page(usual, quick)
     print(text)
     if given.write is not None:
         write_between(given.write, "drift", text)

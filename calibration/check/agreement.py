@@ -1,7 +1,8 @@
 """Which cameras agree with one another, when some are plainly off.
 
-Any two cameras place the carriers; the two under which the fewest others are off were not touched.
-That finds two cameras moved of four, where no majority is left.
+Most of them, when these agree to the noise. Otherwise any two cameras place the carriers; the two
+under which the fewest others are off were not touched. That finds two cameras moved of four, where
+no majority is left.
 """
 
 from __future__ import annotations
@@ -43,8 +44,14 @@ def agreeing(epoch: Epoch, start: Consensus) -> tuple[Consensus, tuple[int, ...]
     No camera is named when all are off, or none, or when fewer than two would be left.
     """
     limit = OFF_SIGMAS * float(np.median(epoch.sigma_px))
-    if not (by_camera(epoch, misfit_px(epoch, start.state)) > limit).any():
+    off = by_camera(epoch, misfit_px(epoch, start.state)) > limit
+    if not off.any():
         return start, ()
+    others = np.flatnonzero(~off)
+    again = consensus(epoch, among=others)
+    left = by_camera(epoch, misfit_px(epoch, again.state)) > limit
+    if 2 * len(others) > len(off) and not left[others].any():
+        return again, tuple(int(k) for k in np.flatnonzero(left))
     found = [c for c in (_of_pair(epoch, a, b, limit) for a, b in _pairs(epoch)) if c is not None]
     if not found:
         return start, ()

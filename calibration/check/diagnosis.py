@@ -91,7 +91,7 @@ def diagnose(
     outcomes = tests.run(first.score)
     last, accepted, present, current = first, [], outcomes, tests
     if suspects:
-        accepted = convicted(epoch, state, tests.hypotheses, suspects)
+        accepted = convicted(epoch, state, tests.hypotheses, suspects, first)
         last = fit_with(epoch, state, accepted)
         epoch, last, lost = _cleaned(epoch, last)
         current = ScoreTests(tests.hypotheses, last.linear)

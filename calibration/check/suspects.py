@@ -48,28 +48,38 @@ def is_lens(by_pose: float, by_lens: float, by_both: float) -> bool:
 
 
 def convicted(
-    epoch: Epoch, state: State, tests: tuple[Hypothesis, ...], suspects: tuple[int, ...]
+    epoch: Epoch,
+    state: State,
+    tests: tuple[Hypothesis, ...],
+    suspects: tuple[int, ...],
+    unchanged: Fit,
 ) -> list[Hypothesis]:
     """For each suspected camera whether it moved, its lens changed, or it exposed late.
 
-    Cameras that are fine once the others are free are left out.
+    ``unchanged``: the fit with nothing free. Cameras that are fine once the others are free are
+    left out.
     """
     own = {(h.cause, h.subject): h for h in tests}
     rows = [
         _Suspect(own[Cause.POSE, c], own[Cause.LENS, c], own.get((Cause.CAMERA_SYNC, c)))
         for c in suspects
     ]
-    found = [_cause(epoch, state, one, [o for o in rows if o is not one]) for one in rows]
+    found = [
+        _cause(epoch, state, one, [o for o in rows if o is not one], unchanged) for one in rows
+    ]
     return [h for h in found if h is not None]
 
 
-def _cause(epoch: Epoch, state: State, one: _Suspect, others: list[_Suspect]) -> Hypothesis | None:
+def _cause(
+    epoch: Epoch, state: State, one: _Suspect, others: list[_Suspect], unchanged: Fit
+) -> Hypothesis | None:
     free = [h for other in others for h in other.causes]
 
     def explained(*causes: Hypothesis) -> float:
         return -fit_with(epoch, state, [*causes, *free]).chi2
 
-    nothing, by_pose, by_lens = explained(), explained(one.pose), explained(one.lens)
+    nothing = explained() if others else -unchanged.chi2
+    by_pose, by_lens = explained(one.pose), explained(one.lens)
     best, gain = one.pose, by_pose - nothing
     if is_lens(by_pose, by_lens, explained(one.pose, one.lens)):
         best, gain = one.lens, by_lens - nothing
