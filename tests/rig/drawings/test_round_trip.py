@@ -34,7 +34,7 @@ POSITION_MM = 0.05 + 1e-9
 ROTATION_DEG = 3**0.5 * 0.005 + 1e-6
 """Three angles, each off by half of 0.01 degree at most."""
 
-PLANS = {"t-slot": tslot_plan(5), "plate": plate_plan(), "many": tslot_plan(24)}
+PLANS = {"t-slot": tslot_plan(5), "plate": plate_plan(), "many": tslot_plan(18)}
 
 
 @pytest.fixture(params=PLANS)
