@@ -26,7 +26,7 @@ SHORT_MM = 3.0
 NEAR_MM, FAR_MM = 6.0, 12.0
 NAMES_MM, CROWD_NAMES_MM = 2.0, 1.6
 MANY = 40
-TITLE_MM = 24.0
+TITLE_MM = 25.5
 AXIS_SHARE = 0.35
 """Optical axes are drawn this far of the way to the focus."""
 
