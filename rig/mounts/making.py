@@ -12,13 +12,14 @@ from geometry.subject import Subject
 from rig.layout import foremost_point
 from rig.mounts.clashes import find_clashes
 from rig.mounts.plan import Figures, MountPlan, Price
+from rig.mounts.relaxing import relaxed
 from rig.mounts.rounding import Rounder, nearest, needs_rounding
 from rig.mounts.settings import CameraMount
 from rig.mounts.solids import camera_solids
 from rig.mounts.steps import assembly_steps
 from rig.mounts.surroundings import SEAT_HEIGHT_MM, Surroundings, Zone, head_entry
 from rig.mounts.systems.base import Holding, MountSystem
-from rig.mounts.tolerancing import TRIALS, Tolerancer, yield_share
+from rig.mounts.tolerancing import Tolerancer, trials_for, yield_share
 from solver.limits import Limits
 from solver.progress import CancelToken, NeverCancelled, Progress, ProgressCallback, ignore_progress
 from solver.quality import evaluate
@@ -82,11 +83,13 @@ class _Job:
     ) -> None:
         self.cameras, self.subject, self.limits = cameras, subject, limits
         self._progress, self.cancel = progress, cancel
+        self._fraction = 0.0
 
     def tell(self, stage: str, fraction: float) -> None:
         if self.cancel.is_set():
             raise CancelledError
-        self._progress(Progress(stage, fraction))
+        self._fraction = max(self._fraction, fraction)
+        self._progress(Progress(stage, self._fraction))
 
     def network(self, mounts: tuple[CameraMount, ...]) -> tuple[RigCamera, ...]:
         """All cameras, those on mounts as their settings put them."""
@@ -96,13 +99,22 @@ class _Job:
     def evaluate(self, mounts: tuple[CameraMount, ...]) -> Quality:
         return evaluate(self.subject, self.network(mounts), self.limits)
 
+    def relaxed(self, spec: SystemSpec) -> tuple[tuple[RigCamera, ...], float]:
+        """The cameras with room to set them, and how much of it."""
+        if max(spec.system.steps) <= 0.0:
+            return self.cameras, 0.0
+        return relaxed(
+            self.cameras, self.subject, self.limits, steps=spec.system.steps, spare=spec.spare,
+            tell=lambda share: self.tell("make room", 0.5 * share), cancel=self.cancel,
+        )  # fmt: skip
+
     def rounded(self, holding: Holding, spare: float) -> tuple[CameraMount, ...]:
         """Settings that exist; those of before where all do."""
         if not needs_rounding(holding.mounts):
             return holding.mounts
         rounder = Rounder(
             self.subject, self.limits, self.cameras, holding.mounts, spare=spare,
-            tell=lambda share: self.tell("round", 0.05 + 0.55 * share), cancel=self.cancel,
+            tell=lambda share: self.tell("round", 0.2 + 0.4 * share), cancel=self.cancel,
         )  # fmt: skip
         return rounder.run()
 
@@ -119,7 +131,7 @@ def make_plan(
     *,
     name: str = "rig",
     seed: int = 0,
-    trials: int = TRIALS,
+    trials: int | None = None,
     progress: ProgressCallback = ignore_progress,
     cancel: CancelToken | None = None,
 ) -> MountPlan:
@@ -135,11 +147,14 @@ def make_plan(
         raise InputError("no-cameras", "no camera needs a mount", "plan a design that places some")
     standing = tuple(camera for camera in cameras if camera.fixed)
     around = spec.surroundings(subject, limits, standing)
-    job.tell("arrange", 0.0)
-    holding = spec.system.hold(free, around)
-    naive = tuple(nearest(mount) for mount in holding.mounts)
-    settled = job.rounded(holding, spec.spare)
+    naive = tuple(nearest(mount) for mount in spec.system.hold(free, around).mounts)
+    roomy, spare = job.relaxed(spec)
+    job.tell("arrange", 0.2)
+    holding = spec.system.hold(tuple(c for c in roomy if not c.fixed), around)
+    settled = job.rounded(holding, spare)
     job.tell("build", 0.6)
+    wanted = {camera.name: camera.pose for camera in free}
+    settled = tuple(replace(mount, wanted=wanted[mount.name]) for mount in settled)
     built = holding.with_mounts(settled).build()
     solids = built.structure.solids + tuple(s for c in standing for s in camera_solids(c))
     clashes = find_clashes(solids, built.joined, job.network(built.mounts), around)
@@ -150,9 +165,10 @@ def make_plan(
     )  # fmt: skip
     tolerances = tolerancer.each()
     job.tell("trials", 0.9)
+    count = trials_for(len(cameras)) if trials is None else trials
     share = yield_share(
         lambda tried: evaluate(subject, tried, limits).feasible, job.network(built.mounts),
-        built.mounts, seed=seed, trials=trials, cancel=job.cancel,
+        built.mounts, seed=seed, trials=count, cancel=job.cancel,
     )  # fmt: skip
     job.tell("done", 1.0)
     return MountPlan(
@@ -165,7 +181,7 @@ def make_plan(
         tolerances=tolerances,
         clashes=clashes,
         yield_share=share,
-        yield_trials=trials,
+        yield_trials=count,
         steps=assembly_steps(built.structure, built.mounts),
         notes=built.notes,
     )

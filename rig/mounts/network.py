@@ -1,8 +1,8 @@
 """What one camera's move does to the whole network, fast enough to try thousands of moves.
 
 The rows of the limits come from the solver's own table. It is asked only for the camera that
-moves and those whose limits it shares, on the points that can matter: the outermost points of
-each view and an even sample of the rest. Coverage is counted on all check points. A finished
+moves and those whose limits it shares, on the points that can matter: the outermost ones it
+sees and an even sample of the rest. Coverage is counted on all check points. A finished
 rig is always judged by :func:`solver.quality.evaluate` on everything.
 """
 
@@ -26,6 +26,9 @@ from solver.scene import Scene
 
 SAMPLE = 500
 """How many check points stand for the others where only means are asked for."""
+
+RIM_SAMPLE = 250
+"""How many are watched beside the outermost ones a camera sees, in case it sees more."""
 
 NEAREST = 2
 BINDING_SHARE = 0.15
@@ -76,9 +79,8 @@ class Network:
                  range(len(cameras))]  # fmt: skip
         self._depth_points = [np.concatenate([p.points(h) for p in self._framing]) for h in hulls]
         self._framed = np.stack([s.framed for s in sightings], axis=1)
-        self._thin = Subject(
-            subject.design_points, _thin_points(subject, sightings, scene), subject.occluder
-        )
+        self._thin = _thinned(subject, SAMPLE)
+        self._outer = [_thinned(subject, RIM_SAMPLE, hull) for hull in hulls]
         self._info = np.stack([self._information(c) for c in cameras])
         self._local = replace(limits, coverage=Coverage((), limits.coverage.unseen_sigma_mm))
         names = [c.name for c in cameras]
@@ -107,8 +109,14 @@ class Network:
         who = self._company[index]
         cameras = tuple(camera if k == index else self.cameras[k] for k in who)
         limits = self._local if len(who) == len(self.cameras) else _without_means(self._local)
-        scene = Scene(self._thin, cameras, limits)
-        visible = [Sightings.of(scene, position).visible for position in self._positions]
+        scene = Scene(self._outer[index], cameras, limits)
+        alone = Scene(self._outer[index], (camera,), limits)
+        visible = []
+        for position in self._positions:
+            # What the others see is not asked for: their own rows do not change.
+            seen = np.zeros((len(who), len(scene.subject.check_points)), dtype=bool)
+            seen[who.index(index)] = Sightings.of(alone, position).visible[0]
+            visible.append(seen)
         table = constraint_table(scene, visible, ())
         return {row.name: row for row in table if self._speaks_of(row, index)}
 
@@ -226,13 +234,13 @@ def _without_means(limits: Limits) -> Limits:
     return replace(limits, base_height=pairs, symmetry=None, spacing=None)
 
 
-def _thin_points(subject: Subject, sightings: list[Sightings], scene: Scene) -> SurfacePoints:
-    """The outermost check points of each view, and an even sample of all."""
+def _thinned(subject: Subject, sample: int, more_mm: Floats | None = None) -> Subject:
+    """The subject with an even sample of its check points, and those that are given as well."""
     points = subject.check_points
     rows = np.zeros(len(points), dtype=bool)
-    rows[:: max(1, len(points) // SAMPLE)] = True
-    where = {tuple(p): k for k, p in enumerate(points.points_mm)}
-    for i in range(scene.count):
-        hull = scene.hull(np.logical_or.reduce([s.visible[i] for s in sightings]))
-        rows[[where[tuple(p)] for p in hull]] = True
-    return SurfacePoints(points.points_mm[rows], points.normals[rows])
+    rows[:: max(1, len(points) // sample)] = True
+    if more_mm is not None:
+        where = {tuple(p): k for k, p in enumerate(points.points_mm)}
+        rows[[where[tuple(p)] for p in more_mm]] = True
+    kept = SurfacePoints(points.points_mm[rows], points.normals[rows])
+    return Subject(subject.design_points, kept, subject.occluder)

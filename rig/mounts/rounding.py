@@ -10,48 +10,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 
 import numpy as np
 
-from geometry.arrays import Floats
 from geometry.camera import RigCamera
 from geometry.errors import CancelledError, InputError
 from geometry.subject import Subject
 from rig.mounts.kinematics import keeping_aim, reach, rotation_at
-from rig.mounts.network import Network, Score, size_of
+from rig.mounts.linear import Linear, LinearModel
+from rig.mounts.network import Network, Score
 from rig.mounts.settings import CameraMount, Setting
 from solver.limits import Limits
 from solver.progress import CancelToken
-from solver.result import ConstraintRow
 
 PROBE_MM = 0.5
 """How far a slide is moved to see what it does to the limits."""
 
 PROBE_DEG = 0.05
 
-STEP_SCALE_MM = 3.0
-HARD = 300.0
-"""Weight of a limit against moving: a breach of 0.1 % weighs as much as 1 mm."""
+SHARES = (1.0, 0.85, 0.7, 0.5, 0.3, 0.15, 0.0)
+"""How much of the room for settings that are half a step off is tried, the most first."""
 
-SWEEPS = 4
-STRIDES = (1, -1, 3, -3)
-
-
-@dataclass(frozen=True, eq=False)
-class Linear:
-    """Rows of the limits about the present settings (m).
-
-    ``jacobian`` (r, m) of the ``slack`` (r,); ``size`` (r,) as in :func:`size_of`; ``margin``
-    (r,) what settings that are half a step off can take away.
-    """
-
-    names: tuple[str, ...]
-    jacobian: Floats
-    slack: Floats
-    size: Floats
-    margin: Floats
+SWEEPS = 3
 
 
 def _slides(mount: CameraMount) -> list[Setting]:
@@ -89,14 +71,31 @@ class Rounder:
         self._tell, self._cancel, self._spare = tell, cancel, spare
         self.mounts = list(mounts)
 
+    def relax(self, loss: Callable[[tuple[RigCamera, ...]], float], most: float) -> float:
+        """Draw the limits in as far as costs at most ``most`` of ``loss``; the share drawn in."""
+        for k, mount in enumerate(self.mounts):
+            self._set(k, mount)
+        at = tuple(self.mounts)
+        linear = self._linear(margins=True)
+        for share in SHARES:
+            for k, mount in enumerate(at):
+                self._set(k, mount)
+            margins = linear.margins(share * self._spare)
+            self._draw_in(linear, margins)
+            if loss(tuple(self._network.cameras)) <= most:
+                break
+        self._draw_in(self._linear(margins=False), margins)
+        return share * self._spare
+
     def run(self) -> tuple[CameraMount, ...]:
-        """All steps."""
+        """Round all settings and make the best of it."""
         for k, mount in enumerate(self.mounts):
             self._set(k, self._turned(mount, {}))
-        for _ in range(2):
-            linear = self._linear()
-            self._network.margins = dict(zip(linear.names, linear.margin.tolist(), strict=True))
-            self._draw_in(linear)
+        linear = self._linear(margins=True)
+        margins = linear.margins(self._spare)
+        self._draw_in(linear, margins)
+        self._draw_in(self._linear(margins=False), margins)
+        self._network.margins = margins
         for k, mount in enumerate(self.mounts):
             self._set(k, nearest(mount))
         self._tell(0.5)
@@ -126,11 +125,9 @@ class Rounder:
         wanted = keeping_aim(mount.camera.pose, rotation_at(mount.chain, at), self._target)
         return mount.moved(reach(mount.chain, at, slides, wanted, with_rotation=False))
 
-    def _draw_in(self, linear: Linear) -> None:
+    def _draw_in(self, linear: Linear, margins: Mapping[str, float]) -> None:
         """Move the slides of all cameras so that no limit comes nearer than its margin."""
-        free = np.array([s.unit == "mm" for m in self.mounts for s in m.settings])
-        jacobian = linear.jacobian[:, free] / linear.size[:, None]
-        move = _least_move((linear.margin - linear.slack) / linear.size, jacobian)
+        move = linear.least_move(margins)
         done = 0
         for k, mount in enumerate(self.mounts):
             slides = _slides(mount)
@@ -141,32 +138,25 @@ class Rounder:
             done += len(slides)
             self._set(k, mount.moved(values))
 
-    def _linear(self) -> Linear:
-        """How the slack of all rows follows all settings, at the present ones."""
-        rows: dict[str, ConstraintRow] = {}
-        entries: dict[tuple[str, int], float] = {}
-        column = 0
+    def _linear(self, *, margins: bool) -> Linear:
+        """How the slack of all rows follows the slides and, for margins, all settings."""
+        model = LinearModel()
         for k, mount in enumerate(self.mounts):
             self._check()
             number = self._number[mount.name]
             here = self._network.rows(number, self._camera(mount))
-            rows = here | rows
+            model.rows(here)
             for setting in mount.settings:
                 probe = PROBE_MM if setting.unit == "mm" else PROBE_DEG
                 moved = mount.moved({setting.name: setting.value + probe})
-                there = self._network.rows(number, self._camera(moved))
-                for name in here.keys() & there.keys():
-                    entries[name, column] = (there[name].slack - here[name].slack) / probe
-                column += 1
+                if margins:
+                    # A setting that comes out wrong is not followed by the focus.
+                    there = self._network.rows(number, moved.camera)
+                    model.error(here, there, probe, setting.step / 2.0)
+                if setting.unit == "mm":
+                    model.move(here, self._network.rows(number, self._camera(moved)), probe)
             self._tell(0.25 * (k + 1) / len(self.mounts))
-        index = {name: i for i, name in enumerate(rows)}
-        jacobian = np.zeros((len(rows), column))
-        for (name, at), value in entries.items():
-            jacobian[index[name], at] = value
-        half = np.array([s.step / 2.0 for m in self.mounts for s in m.settings])
-        slack = np.array([row.slack for row in rows.values()])
-        size = np.array([size_of(row) for row in rows.values()])
-        return Linear(tuple(rows), jacobian, slack, size, self._spare * _spread(jacobian, half))
+        return model.made()
 
     def _sweep(self, sweep: int) -> bool:
         """Try the neighbouring steps of every setting; whether anything got better."""
@@ -189,7 +179,7 @@ class Rounder:
         for setting in mount.settings:
             if setting.step <= 0.0:
                 continue
-            for stride in STRIDES if setting.unit == "mm" else STRIDES[:2]:
+            for stride in (1, -1):
                 value = setting.value + stride * setting.step
                 if not setting.low <= value <= setting.high:
                     continue
@@ -203,16 +193,6 @@ class Rounder:
                         continue
 
 
-def _spread(jacobian: Floats, half_step: Floats) -> Floats:
-    """How far settings that are up to half a step off can take each row (r,), to first order.
-
-    The sum of all effects, or 2.5 standard deviations of their sum where that is less.
-    """
-    effects = np.abs(jacobian) * half_step
-    deviation = np.sqrt((effects**2).sum(axis=1) / 3.0)
-    return np.asarray(np.minimum(effects.sum(axis=1), 2.5 * deviation))
-
-
 def _is_better(one: Score, other: Score) -> bool:
     """Breaks less; or as little, with more room; or with as much, at less cost."""
     if abs(one.breach - other.breach) > 1e-9:
@@ -220,23 +200,3 @@ def _is_better(one: Score, other: Score) -> bool:
     if abs(one.lack - other.lack) > 1e-3:
         return one.lack < other.lack
     return one.cost_mm2 < other.cost_mm2 * (1.0 - 1e-6)
-
-
-def _least_move(lack: Floats, jacobian: Floats) -> Floats:
-    """The least move (m,) that gains ``lack`` (r,) where it is positive, in least squares.
-
-    Minimises |move / scale|^2 + HARD^2 |max(0, lack - J move)|^2 by Newton steps on the set of
-    rows that still lack something; the objective is convex and piecewise quadratic.
-    """
-    count = jacobian.shape[1]
-    move: Floats = np.zeros(count)
-    inertia = np.eye(count) / STEP_SCALE_MM**2
-    active = lack > 0.0
-    for _ in range(50):
-        rows = HARD * jacobian[active]
-        move = np.asarray(np.linalg.solve(inertia + rows.T @ rows, HARD * rows.T @ lack[active]))
-        now = lack - jacobian @ move > 0.0
-        if (now == active).all():
-            break
-        active = now
-    return np.asarray(move)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -16,6 +16,7 @@ from rig.mounts.rounding import PROBE_DEG, PROBE_MM
 from rig.mounts.settings import CameraMount, Setting
 from solver.limits import Limits
 from solver.progress import CancelToken
+from solver.result import ConstraintRow
 
 WIDEST_MM = 20.0
 WIDEST_DEG = 5.0
@@ -24,7 +25,9 @@ WIDEST_DEG = 5.0
 NEAR = 0.05
 """A tolerance is known to this share of itself, rounded down."""
 
-TRIALS = 200
+MOST_TRIALS, LEAST_TRIALS, WORK = 100, 10, 1000
+"""Trials of a rig with so many cameras that trials times cameras is the work, within bounds."""
+
 MADE_MM = 0.2
 MADE_DEG = 0.1
 """How far off a drilled hole or a printed angle may come out: settings without steps."""
@@ -57,45 +60,59 @@ class Tolerancer:
 
     def each(self) -> tuple[Tolerance, ...]:
         """The tolerance of every setting alone."""
-        out = []
+        out: list[Tolerance] = []
         for k, mount in enumerate(self._mounts):
-            for setting in mount.settings:
-                if self._cancel.is_set():
-                    raise CancelledError
-                plus, limit = self._reach(mount, setting, 1.0)
-                minus, other = self._reach(mount, setting, -1.0)
-                named = limit if plus <= minus else other
-                out.append(Tolerance(mount.name, setting.name, setting.unit, plus, minus, named))
+            if self._cancel.is_set():
+                raise CancelledError
+            out += self._of(mount)
             self._tell((k + 1) / len(self._mounts))
         return tuple(out)
+
+    def _of(self, mount: CameraMount) -> Iterator[Tolerance]:
+        number = self._number[mount.name]
+        here, now = (
+            self._network.rows(number, mount.camera),
+            self._network.broken(number, mount.camera),
+        )
+        for setting in mount.settings:
+            ends = [(0.0, now), (0.0, now)]
+            if not now:
+                guesses = self._guesses(mount, setting, here)
+                ends = [
+                    self._reach(mount, setting, sign, guess)
+                    for sign, guess in zip((1.0, -1.0), guesses, strict=True)
+                ]
+            (plus, limit), (minus, other) = ends
+            named = limit if plus <= minus else other
+            yield Tolerance(mount.name, setting.name, setting.unit, plus, minus, named)
 
     def _broken(self, mount: CameraMount, setting: Setting, off: float) -> str:
         moved = mount.moved({setting.name: setting.value + off})
         # The focus is set on the camera where it stands and stays as it is.
         return self._network.broken(self._number[mount.name], moved.camera)
 
-    def _guess(self, mount: CameraMount, setting: Setting, sign: float) -> float:
-        """Where the first limit breaks, if all went on in proportion."""
-        number = self._number[mount.name]
-        probe = sign * (PROBE_MM if setting.unit == "mm" else PROBE_DEG)
+    def _guesses(
+        self, mount: CameraMount, setting: Setting, here: Mapping[str, ConstraintRow]
+    ) -> tuple[float, float]:
+        """Where the first limit breaks on either side, if all went on in proportion."""
+        probe = PROBE_MM if setting.unit == "mm" else PROBE_DEG
         moved = mount.moved({setting.name: setting.value + probe})
-        here = self._network.rows(number, mount.camera)
-        there = self._network.rows(number, moved.camera)
-        reach = [
-            abs(probe) * max(here[name].slack, 0.0) / (here[name].slack - there[name].slack)
-            for name in here.keys() & there.keys()
-            if there[name].slack < here[name].slack
-        ]
-        return min(reach, default=np.inf)
+        there = self._network.rows(self._number[mount.name], moved.camera)
+        plus = minus = np.inf
+        for name in here.keys() & there.keys():
+            slack, rate = max(here[name].slack, 0.0), (there[name].slack - here[name].slack) / probe
+            if rate < 0.0:
+                plus = min(plus, -slack / rate)
+            elif rate > 0.0:
+                minus = min(minus, slack / rate)
+        return float(plus), float(minus)
 
-    def _reach(self, mount: CameraMount, setting: Setting, sign: float) -> tuple[float, str]:
+    def _reach(
+        self, mount: CameraMount, setting: Setting, sign: float, guess: float
+    ) -> tuple[float, str]:
         """How far the setting may go one way, and what breaks there."""
         widest = WIDEST_MM if setting.unit == "mm" else WIDEST_DEG
-        now = self._broken(mount, setting, 0.0)
-        if now:
-            return 0.0, now
         low, high, limit = 0.0, widest, ""
-        guess = min(self._guess(mount, setting, sign), widest)
         for trial in (guess * (1.0 - NEAR / 2.0), guess * (1.0 + NEAR / 2.0)):
             if low < trial < high:
                 found = self._broken(mount, setting, sign * trial)
@@ -104,11 +121,17 @@ class Tolerancer:
             limit = self._broken(mount, setting, sign * high)
             if not limit:
                 return float("inf"), ""
-        while high - low > max(NEAR * high, 1e-3):
+        # Ends closer than a tenth of what can be set are as good as equal.
+        while high - low > max(1.01 * NEAR * high, 0.1 * half_step(setting)):
             middle = 0.5 * (low + high)
             found = self._broken(mount, setting, sign * middle)
             low, high, limit = (low, middle, found) if found else (middle, high, limit)
         return float(low), limit
+
+
+def trials_for(cameras: int) -> int:
+    """How many trial rigs are worth their time."""
+    return int(np.clip(WORK // cameras, LEAST_TRIALS, MOST_TRIALS))
 
 
 def yield_share(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Protocol, Self
 
 from geometry.camera import RigCamera
@@ -51,6 +51,11 @@ class MountSystem(Protocol):
         """``t-slot``, ``plate``, ``arc`` or ``tripods``."""
         ...
 
+    @property
+    def steps(self) -> tuple[float, float]:
+        """To what its slides (mm) and angles (degrees) can be set; 0: made to the figure."""
+        ...
+
     def hold(self, cameras: tuple[RigCamera, ...], around: Surroundings) -> Holding:
         """Arrange the mounts so that every camera has its wanted pose, not yet rounded.
 
@@ -58,8 +63,3 @@ class MountSystem(Protocol):
         that cannot be held.
         """
         ...
-
-
-def same_camera(mount: CameraMount, camera: RigCamera) -> CameraMount:
-    """The mount with the focus of ``camera``; its pose stays that of its settings."""
-    return replace(mount, camera=replace(camera, pose=mount.camera.pose))

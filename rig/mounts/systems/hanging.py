@@ -18,7 +18,7 @@ from rig.mounts.surroundings import Surroundings
 from rig.mounts.systems.heads import Stance, stances
 from rig.mounts.systems.outrigger import FOOTINGS, Footing, Hung, Outrigger
 
-ROOM_MM = 12.0
+ROOM_MM = 14.0
 """Room kept while mounts are arranged: rounding an angle by half a degree moves a camera
 about 6 mm at arm's length, and its neighbour may come the same way."""
 

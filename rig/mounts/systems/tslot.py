@@ -146,6 +146,11 @@ class TSlotSystem:
     share_mm: float
     kind: str = "t-slot"
 
+    @property
+    def steps(self) -> tuple[float, float]:
+        """Steps of slides and head."""
+        return self.step_mm, self.outrigger.head.step_deg
+
     def hold(self, cameras: tuple[RigCamera, ...], around: Surroundings) -> TSlotHolding:
         """See :class:`rig.mounts.systems.base.MountSystem`."""
         bay_of = _bays(cameras, around)
