@@ -171,8 +171,8 @@ class ArcHolding:
             Tape(f"inner edge of the lower end of {rib.id}.1", f"lens front of {name}",
                  _far(front, mark)),
         )  # fmt: skip
-        parts = (f"{rib.id} upright", hung.rail, hung.stub_id, hung.arm_id)
-        parts += tuple(p.id for p in hung.placed())
+        placed = (p.id for p in hung.placed())
+        parts = (f"{rib.id} upright", hung.rail, hung.stub_id, hung.arm_id, *placed)
         return replace(hung.mount, carried_by=parts, tapes=tapes)
 
     def _props(self, rib: Rib) -> list[Member]:

@@ -313,7 +313,7 @@ class PlateHolding:
         stand = self._stand(low, high)
         members = (*stand, *(p.member() for p in self.posted))
         thick = self.system.thickness_mm
-        solids = [box("plate", "plate", self.face, [*low, -thick], [*high, 0.0])]
+        solids = [box("plate", "plate", self.face, np.append(low, -thick), np.append(high, 0.0))]
         solids += [
             bar(m.id, "member", m.axis_mm[0], m.axis_mm[1], m.across, m.size_mm) for m in stand
         ]
