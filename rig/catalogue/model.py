@@ -209,9 +209,13 @@ class ProfileEntry(Entry):
 class BracketEntry(Entry):
     """A bracket or joint."""
 
-    kind: Literal["corner", "pivot", "head-plate", "clamp"] = Field(description="Kind of bracket.")
+    kind: Literal["corner", "pivot", "head-plate", "clamp", "stand"] = Field(
+        description="Kind of bracket; a stand carries a head over the floor."
+    )
     series: list[Words] = Field(description="Profile series it fits.")
-    size_mm: Vector | None = Field(default=None, description="Width, height and depth.")
+    size_mm: Vector | None = Field(
+        default=None, description="Width, height and depth; of a stand at its full height."
+    )
     bolt: Words | None = Field(default=None, description="Bolts it takes.")
     bolts: Annotated[int, Field(ge=1, le=100)] | None = Field(default=None, description="How many.")
     angle_deg: Pair | None = Field(default=None, description="Range of its angle.")

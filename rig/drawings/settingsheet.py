@@ -89,7 +89,8 @@ def _tolerance(tolerance: Tolerance) -> str:
     """How far a setting may be off, both ways; ∞ when no limit broke in the range tried."""
 
     def side(value: float) -> str:
-        return "∞" if math.isinf(value) else fixed(abs(value), 1)
+        # What is made to the figure is made more exactly than anybody sets.
+        return "∞" if math.isinf(value) else fixed(abs(value), 1 if abs(value) >= 1.0 else 2)
 
     plus, minus = side(tolerance.plus), side(tolerance.minus)
     return f"± {plus}" if plus == minus else f"+ {plus} / - {minus}"

@@ -23,10 +23,13 @@ SIZE_MM = 20.0
 """Overall sizes stand this far from what is built, beyond the ordinates of members."""
 
 SHORT_MM = 3.0
+MORE_MM = 3.0
+"""Further out at the right, where a size stands between its line and the ordinates."""
+
 NEAR_MM, FAR_MM = 6.0, 12.0
 NAMES_MM, CROWD_NAMES_MM = 2.0, 1.6
 MANY = 40
-TITLE_MM = 24.0
+TITLE_MM = 25.5
 AXIS_SHARE = 0.35
 """Optical axes are drawn this far of the way to the focus."""
 
@@ -176,7 +179,7 @@ def _size(built: _Built, axis: int) -> Dimension:
         ends = (left, high + near), (right, high + near)
         return Dimension(*ends, high + SIZE_MM, False, built.size_words[0])
     ends = (right + near, low), (right + near, high)
-    return Dimension(*ends, right + SIZE_MM, True, built.size_words[1])
+    return Dimension(*ends, right + SIZE_MM + MORE_MM, True, built.size_words[1])
 
 
 def _row(

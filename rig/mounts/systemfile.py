@@ -18,9 +18,11 @@ from geometry.errors import InputError, TooLargeError
 from rig.catalogue import Catalogue, load_catalogue
 from rig.mounts.making import SystemSpec
 from rig.mounts.surroundings import Zone
+from rig.mounts.systems.arc import ArcSystem
 from rig.mounts.systems.base import MountSystem
 from rig.mounts.systems.heads import HeadKind
-from rig.mounts.systems.parts import outrigger_of, profile_named
+from rig.mounts.systems.parts import outrigger_of, plate_of, profile_named, stand_named
+from rig.mounts.systems.tripods import TripodSystem
 from rig.mounts.systems.tslot import TSlotSystem
 from rig.strict import StrictModel, Vector, validated
 
@@ -48,17 +50,31 @@ class SystemFile(StrictModel):
     schema_: Literal["rigwright.mount/1"] = Field(
         default=SCHEMA, alias="schema", description='Version of the format: `"rigwright.mount/1"`.'
     )
-    kind: Literal["t-slot"] = Field(description="Kind of mount.")
+    kind: Literal["t-slot", "plate", "arc", "tripods"] = Field(description="Kind of mount.")
     name: str = Field(
         default="", max_length=200, description="What to call the mount; its kind without it."
     )
-    profile: str = Field(default="2020", description="Profile of the catalogue.")
+    profile: str | None = Field(
+        default=None, description="Profile of the catalogue; 2040 for a plate, else 2020."
+    )
     head: str = Field(default="generic-ball-25", description="Head of the catalogue.")
     slot_step_mm: float = Field(
         default=1.0, gt=0.0, le=50.0, description="To what a slide can be set."
     )
     head_step_deg: float | None = Field(
         default=None, gt=0.0, le=10.0, description="To what a head can be set, if not as listed."
+    )
+    radius_mm: float | None = Field(
+        default=None, gt=0.0, le=1e5,
+        description="Radius of an arc's ribs. Without it: as small as the cameras allow.",
+    )  # fmt: skip
+    thickness_mm: float = Field(default=10.0, gt=0.0, le=100.0, description="Thickness of a plate.")
+    material: str = Field(
+        default="aluminium EN AW-5083", max_length=100, description="What a plate is made of."
+    )
+    stand: str = Field(default="tripod-1800", description="Tripod of the catalogue.")
+    floor_step_mm: float = Field(
+        default=1.0, gt=0.0, le=100.0, description="To what a tripod can be put on the floor."
     )
     share_mm: float = Field(
         default=150.0, ge=0.0, le=400.0,
@@ -101,11 +117,22 @@ class SystemFile(StrictModel):
         )
 
     def _system(self, catalogue: Catalogue) -> MountSystem:
+        profile = profile_named(self.profile or _PROFILES[self.kind], catalogue)
+        if self.kind == "plate":
+            return plate_of(profile, self.thickness_mm, self.material, catalogue)
         head = HeadKind.named(self.head, catalogue)
         if self.head_step_deg is not None:
             head = replace(head, step_deg=self.head_step_deg)
-        profile = profile_named(self.profile, catalogue)
-        return TSlotSystem(outrigger_of(profile, head, catalogue), self.slot_step_mm, self.share_mm)
+        if self.kind == "tripods":
+            stand = stand_named(self.stand, catalogue)
+            return TripodSystem(stand, head, self.floor_step_mm, self.slot_step_mm)
+        parts = outrigger_of(profile, head, catalogue)
+        if self.kind == "arc":
+            return ArcSystem(parts, self.slot_step_mm, self.share_mm, self.radius_mm)
+        return TSlotSystem(parts, self.slot_step_mm, self.share_mm)
+
+
+_PROFILES = {"t-slot": "2020", "plate": "2040", "arc": "2020", "tripods": "2020"}
 
 
 def system_from_mapping(

@@ -8,6 +8,7 @@ from rig.catalogue.catalogue import pick
 from rig.catalogue.items import Bracket, Profile
 from rig.mounts.systems.heads import HeadKind
 from rig.mounts.systems.outrigger import Outrigger
+from rig.mounts.systems.plate import PlateSystem
 
 
 def profile_named(wanted: str, catalogue: Catalogue) -> Profile:
@@ -73,3 +74,30 @@ def outrigger_of(profile: Profile, head: HeadKind, catalogue: Catalogue) -> Outr
         screw=screw_for(profile.bolt, catalogue),
         head=head,
     )
+
+
+def plate_of(
+    profile: Profile, thickness_mm: float, material: str, catalogue: Catalogue
+) -> PlateSystem:
+    """A plate whose posts are of a profile with two core bores side by side."""
+    if profile.height_mm < 1.5 * profile.width_mm:
+        double = [p.id for p in catalogue.profiles.values() if p.height_mm >= 1.5 * p.width_mm]
+        raise InputError(
+            "plate-profile",
+            f"a post of profile {profile.id} would turn on its one screw",
+            f"choose {' or '.join(double)}, which takes two",
+        )
+    return PlateSystem(
+        profile=profile,
+        corner=bracket_for(profile, "corner", catalogue),
+        t_nut=t_nut_for(profile, catalogue),
+        screw=screw_for(profile.bolt, catalogue),
+        thickness_mm=thickness_mm,
+        material=material,
+    )
+
+
+def stand_named(wanted: str, catalogue: Catalogue) -> Bracket:
+    """The stand of this id or name."""
+    stands = {key: b for key, b in catalogue.brackets.items() if b.kind == "stand"}
+    return pick(wanted, stands, "stand")

@@ -22,7 +22,7 @@ from solver.quality import evaluate
 def plan() -> MountPlan:
     subject, limits = face(), face_limits()
     cameras = face_cameras(subject, 4)
-    return make_plan(cameras, subject, limits, parse_system('kind = "t-slot"'), trials=10)
+    return make_plan(cameras, subject, limits, parse_system('kind = "t-slot"'), trials=3)
 
 
 def test_every_setting_exists_and_gives_the_pose() -> None:

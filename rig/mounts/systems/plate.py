@@ -1,0 +1,428 @@
+"""The flat plate: a post for each camera, square to the plate, and a printed wedge on the post.
+
+The plate stands upright behind the cameras. A post is a length of profile with two core bores
+(2040), held by two screws through the plate; the line of the two holes sets how the post is
+turned. The wedge sits on the post's side near its end and holds the camera's angles exactly. A
+post is cut to whole millimetres and the wedge's holes make up for the rest, so nothing is
+rounded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+
+from geometry.arrays import Floats
+from geometry.camera import RigCamera
+from geometry.errors import InputError
+from geometry.frames import Pose
+from rig.catalogue.items import Bracket, Profile
+from rig.convex import box_corners
+from rig.mounts.clashes import Site, pairs
+from rig.mounts.kinematics import (
+    ANGLES,
+    frame,
+    frames_along,
+    head_angles,
+    head_links,
+    reach,
+    rotated,
+    turned_over,
+)
+from rig.mounts.settings import CameraMount, Link, Motion, Setting, Tape, chain_pose, shift, turn
+from rig.mounts.solids import bar, box, camera_solids, carried, lens_front
+from rig.mounts.structure import Hole, Joint, Member, PlacedPart, Plate, Solid, Structure, Wedge
+from rig.mounts.surroundings import Surroundings
+from rig.mounts.systems.base import Built
+from rig.mounts.tolerancing import MADE_DEG, MADE_MM
+
+X, Y, Z = np.eye(3)
+PLATE_AXES = np.stack([-X, Z, Y], axis=1)
+"""Seen from the subject: x to the right, y up, z out of the plate towards the subject."""
+
+BEHIND_MM = 25.0
+EDGE_MM = 60.0
+BASE_LENGTH_MM = 60.0
+HOLE_SPREAD_MM = 15.0
+LEAST_SEAT_MM = 12.0
+UNDER_MM = 3.0
+STEEPEST_DEG = 65.0
+"""Steepest wedge: beyond it a printed one leans too far to be strong."""
+
+TURNS_DEG = (0.0, 30.0, -30.0, 60.0, -60.0)
+ROOM_MM = 1.0
+LONGEST_POST_MM = 1500.0
+SCREW_HOLES_MM = {"M5": 5.5, "M6": 6.6, "M8": 9.0, "5/16-18": 8.4}
+"""Clearance holes of the medium series, ISO 273; for inches ASME B18.2.8 normal fit."""
+
+CAMERA_SCREW = "stud-1-4-20"
+CAMERA_HOLE_MM = 6.8
+
+
+@dataclass(frozen=True, eq=False)
+class Posted:
+    """One camera on its post and wedge. ``wedge_back_mm``: the post's end to the wedge's middle."""
+
+    mount: CameraMount
+    seat_mm: float
+    wedge_back_mm: float
+    profile: Profile
+
+    @property
+    def post_id(self) -> str:
+        """Id of the post."""
+        return f"{self.mount.name} post"
+
+    @property
+    def wedge_id(self) -> str:
+        """Id of the wedge."""
+        return f"{self.mount.name} wedge"
+
+    def _frames(self) -> list[Floats]:
+        return frames_along(self.mount.chain, self.mount.values())
+
+    def foot(self) -> Floats:
+        """The post's foot on the plate (4, 4): x out of its wide side, z along it."""
+        return np.asarray(self._frames()[3])
+
+    def base(self) -> Floats:
+        """The wedge's base (4, 4)."""
+        return np.asarray(self._frames()[4] @ shift(-self.seat_mm * Z))
+
+    def seat(self) -> Floats:
+        """The seat in the wedge's base, (4, 4)."""
+        camera = self._frames()[-1]
+        seat = camera @ np.linalg.inv(self.mount.chain[-1].transform)
+        return np.asarray(np.linalg.inv(self.base()) @ seat)
+
+    def seat_size(self) -> tuple[float, float]:
+        """Width and depth of the seat: the camera's underside, 40 by 30 mm at most."""
+        width, _, depth = self.mount.camera.camera.body.size_mm
+        return min(float(width), 40.0), min(float(depth), 30.0)
+
+    def member(self) -> Member:
+        """The post."""
+        foot, length = self.foot(), self.mount.values()["post"]
+        axis = np.stack([foot[:3, 3], foot[:3, 3] + length * foot[:3, 2]])
+        size = (self.profile.width_mm, self.profile.height_mm)
+        return Member(self.post_id, self.profile.id, "post", axis, foot[:3, 0], size)
+
+    def wedge(self, screw: str) -> Wedge:
+        """The wedge; its base holes lie over the post's two slots."""
+        slot = self.profile.height_mm / 4.0
+        hole = SCREW_HOLES_MM.get(self.profile.bolt or "", 5.5)
+        # In the base's frame x runs across the post, y along it.
+        holes = tuple(
+            Hole(f"{self.mount.name} {k}", x, y, hole, "through", self.profile.bolt or "")
+            for k, (x, y) in enumerate(
+                ((sx * slot, sy * HOLE_SPREAD_MM) for sx in (-1, 1) for sy in (-1, 1)), 1
+            )
+        )
+        return Wedge(
+            self.wedge_id, self.mount.name, self.base(), self.seat(), self.seat_size(),
+            (self.profile.height_mm, BASE_LENGTH_MM), holes, screw, CAMERA_HOLE_MM,
+        )  # fmt: skip
+
+    def solids(self) -> tuple[Solid, ...]:
+        """Post and wedge; the wedge is the hull of base and seat."""
+        post = self.member()
+        base = self.base()
+        flat = np.array([self.profile.height_mm, BASE_LENGTH_MM, 0.0])
+        seat = np.array([*self.seat_size(), 0.0])
+        corners = np.concatenate(
+            [
+                carried(base, box_corners(flat, np.zeros(3))),
+                carried(base @ self.seat(), box_corners(seat, np.zeros(3))),
+            ]
+        )
+        return (
+            bar(post.id, "member", post.axis_mm[0], post.axis_mm[1], post.across, post.size_mm),
+            Solid(self.wedge_id, "wedge", corners),
+        )
+
+    def touching(self) -> tuple[tuple[str, str], ...]:
+        """Pairs of owners that touch by intent."""
+        return ((self.post_id, self.wedge_id), (self.wedge_id, self.mount.name))
+
+
+@dataclass(frozen=True, eq=False)
+class PlateSystem:
+    """A flat plate on two uprights. ``profile`` makes posts and uprights."""
+
+    profile: Profile
+    corner: Bracket
+    t_nut: str
+    screw: str
+    thickness_mm: float
+    material: str
+    kind: str = "plate"
+
+    @property
+    def steps(self) -> tuple[float, float]:
+        """Twice what drilling and printing may be off: room is made for that."""
+        return 2.0 * MADE_MM, 2.0 * MADE_DEG
+
+    def hold(self, cameras: tuple[RigCamera, ...], around: Surroundings) -> PlateHolding:
+        """See :class:`rig.mounts.systems.base.MountSystem`."""
+        everyone = (*cameras, *around.standing)
+        solids = tuple(s for camera in everyone for s in camera_solids(camera))
+        site = Site(solids, everyone, around, ROOM_MM)
+        face = self._face(cameras, around)
+        posted = []
+        for camera in cameras:
+            best: tuple[int, Posted] | None = None
+            for option in self._options(camera, face):
+                count = site.clashes(option.solids(), pairs(*option.touching()))
+                if best is None or count < best[0]:
+                    best = (count, option)
+                if count == 0:
+                    break
+            if best is None:
+                raise self._too_steep(camera)
+            site.add(best[1].solids())
+            posted.append(best[1])
+        return PlateHolding(self, tuple(posted), face, around)
+
+    def _face(self, cameras: tuple[RigCamera, ...], around: Surroundings) -> Floats:
+        """The plate's frame (4, 4), its origin straight behind the datum."""
+        corners = np.concatenate([s.corners_mm for c in cameras for s in camera_solids(c)])
+        origin = around.datum_mm.copy()
+        origin[1] = float(np.floor(corners[:, 1].min() - BEHIND_MM - BASE_LENGTH_MM))
+        return rotated(PLATE_AXES, origin)
+
+    def _too_steep(self, camera: RigCamera) -> InputError:
+        steep = float(np.degrees(np.arccos(np.clip(camera.pose.axis_rig[1], -1.0, 1.0))))
+        return InputError(
+            "wedge-steep",
+            f"no wedge on a plate can hold {camera.name}: it looks {steep:.0f} degrees off the "
+            "plate's normal",
+            "choose a frame or an arc for it, or ask for a design with cameras in front",
+        )
+
+    def _options(self, camera: RigCamera, face: Floats) -> Iterator[Posted]:
+        for more in TURNS_DEG:
+            for pose in (camera.pose, turned_over(camera.pose)):
+                up = -pose.rotation_rig_to_camera[1]
+                across = float(np.hypot(up[0], up[2]))
+                if across < 0.2:
+                    # It stands on its back: no side of a post is under it.
+                    continue
+                turned = float(np.degrees(np.arctan2(up[2], -up[0]))) + more
+                posted = self._post(camera, pose, turned, face)
+                if posted is not None:
+                    yield posted
+
+    def _post(
+        self, camera: RigCamera, pose: Pose, turned_deg: float, face: Floats
+    ) -> Posted | None:
+        """Post and wedge with the post turned so far; None for one that is too steep."""
+        foot = face[:3, :3] @ turn(Z, turned_deg)
+        base = frame(np.zeros(3), foot[:, 1], foot[:, 2], foot[:, 0])[:3, :3]
+        angles = head_angles(pose.rotation_rig_to_camera, base)
+        if abs(angles[1]) > STEEPEST_DEG or abs(angles[2]) > STEEPEST_DEG:
+            return None
+        body = camera.camera.body
+        seat = _seat_height(camera, pose, base)
+        values = dict(zip(ANGLES, (float(a) for a in angles), strict=True))
+        values |= {"across": 0.0, "up": 0.0, "turn": turned_deg, "post": 300.0}
+        back = BASE_LENGTH_MM / 2.0
+        thread = body.mount_thread_camera_mm
+        chain = self._chain(face, back, seat, thread)
+        found = reach(chain, values, ["across", "up", "post"], pose, with_rotation=False)
+        length = float(np.ceil(found["post"] - 1e-9))
+        back += length - found["post"]
+        found["post"] = length
+        if not BASE_LENGTH_MM <= length <= LONGEST_POST_MM:
+            return None
+        chain = self._chain(face, back, seat, thread)
+        mount = CameraMount(
+            camera.moved_to(chain_pose(chain, found)), camera.pose, _settings(found), chain
+        )
+        return Posted(mount, seat, back, self.profile)
+
+    def _chain(
+        self, face: Floats, back_mm: float, seat_mm: float, thread: Floats
+    ) -> tuple[Link, ...]:
+        side = np.array([self.profile.width_mm / 2.0, 0.0, -back_mm])
+        # The wedge's base: x across the post, y along it, z out of its side.
+        base = frame(side, Y, Z, X)
+        return (
+            Link(face, Motion.SLIDE, X, "across"),
+            Link(np.eye(4), Motion.SLIDE, Y, "up"),
+            Link(np.eye(4), Motion.TURN, Z, "turn"),
+            Link(np.eye(4), Motion.SLIDE, Z, "post"),
+            *head_links(base, seat_mm, seat_mm, thread),
+        )
+
+
+def _seat_height(camera: RigCamera, pose: Pose, base: Floats) -> float:
+    """How high the seat must be for the camera to clear the post's side."""
+    body = camera.camera.body
+    corners = box_corners(body.size_mm, body.centre_camera_mm) - body.mount_thread_camera_mm
+    height = corners @ pose.rotation_rig_to_camera @ base[:, 2]
+    return max(LEAST_SEAT_MM, UNDER_MM - float(height.min()))
+
+
+def _settings(values: dict[str, float]) -> tuple[Setting, ...]:
+    """All of a post and a wedge is made to the figure."""
+    words = {
+        "across": (
+            "mm",
+            3000.0,
+            "the datum's mark on the plate, right positive seen from its face",
+        ),
+        "up": ("mm", 3000.0, "the datum's mark on the plate, up positive"),
+        "turn": ("deg", 720.0, "the plate's x axis, anticlockwise seen from its face"),
+        "post": ("mm", LONGEST_POST_MM, "the face of the plate, cut to this length"),
+        "pan": ("deg", 180.0, "along the post, printed"),
+        "tilt": ("deg", 90.0, "along the post, printed"),
+        "roll": ("deg", 180.0, "upright on the post's side, printed"),
+    }
+    return tuple(
+        Setting(name, unit, values[name], 0.0, 0.0 if name == "post" else -most, most, where)
+        for name, (unit, most, where) in words.items()
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class PlateHolding:
+    """Cameras on the posts of a plate."""
+
+    system: PlateSystem
+    posted: tuple[Posted, ...]
+    face: Floats
+    around: Surroundings
+
+    @property
+    def mounts(self) -> tuple[CameraMount, ...]:
+        """In the order of the cameras."""
+        return tuple(p.mount for p in self.posted)
+
+    def with_mounts(self, mounts: tuple[CameraMount, ...]) -> Self:
+        """The same posts at other figures."""
+        posted = tuple(replace(p, mount=m) for p, m in zip(self.posted, mounts, strict=True))
+        return replace(self, posted=posted)
+
+    def build(self) -> Built:
+        """See :class:`rig.mounts.systems.base.Holding`."""
+        low, high = self._extent()
+        plate = self._plate(low, high)
+        stand = self._stand(low, high)
+        members = (*stand, *(p.member() for p in self.posted))
+        thick = self.system.thickness_mm
+        solids = [box("plate", "plate", self.face, np.append(low, -thick), np.append(high, 0.0))]
+        solids += [
+            bar(m.id, "member", m.axis_mm[0], m.axis_mm[1], m.across, m.size_mm) for m in stand
+        ]
+        solids += [s for p in self.posted for s in (*p.solids(), *camera_solids(p.mount.camera))]
+        wedges = tuple(p.wedge(CAMERA_SCREW) for p in self.posted)
+        joints = (*self._stand_joints(stand), *(j for p in self.posted for j in self._joints(p)))
+        touching = [t for p in self.posted for t in p.touching()]
+        touching += [("plate", p.post_id) for p in self.posted] + [(j.on, j.other) for j in joints]
+        parts: tuple[PlacedPart, ...] = ()
+        structure = Structure(members, (plate,), wedges, parts, joints, tuple(solids))
+        return Built(structure, tuple(self._measured(p) for p in self.posted), pairs(*touching))
+
+    def _extent(self) -> tuple[Floats, Floats]:
+        """Least and greatest corner of the plate in its own plane, whole centimetres."""
+        feet = np.stack([self._on_plate(p.foot()[:3, 3]) for p in self.posted])
+        low, high = feet.min(axis=0) - EDGE_MM, feet.max(axis=0) + EDGE_MM
+        return np.floor(low / 10.0) * 10.0, np.ceil(high / 10.0) * 10.0
+
+    def _on_plate(self, point_mm: Floats) -> Floats:
+        return np.asarray((self.face[:3, :3].T @ (point_mm - self.face[:3, 3]))[:2])
+
+    def _plate(self, low: Floats, high: Floats) -> Plate:
+        profile = self.system.profile
+        hole = SCREW_HOLES_MM.get(profile.bolt or "", 5.5)
+        holes = []
+        for post in self.posted:
+            foot = post.foot()
+            for k, sign in enumerate((-1.0, 1.0), 1):
+                point = foot[:3, 3] + sign * profile.height_mm / 4.0 * foot[:3, 1]
+                x, y = self._on_plate(point)
+                holes.append(Hole(f"{post.mount.name} {k}", float(x), float(y), hole, "through",
+                                  profile.bolt or ""))  # fmt: skip
+        inset = profile.width_mm / 2.0
+        for label, x, y in (
+            ("S1", low[0] + inset, low[1] + inset), ("S2", low[0] + inset, high[1] - inset),
+            ("S3", high[0] - inset, low[1] + inset), ("S4", high[0] - inset, high[1] - inset),
+        ):  # fmt: skip
+            holes.append(Hole(label, float(x), float(y), hole, "through", profile.bolt or ""))
+        outline = np.array([low, [high[0], low[1]], high, [low[0], high[1]]])
+        return Plate(
+            "plate", self.system.material, self.system.thickness_mm, self.face, outline,
+            tuple(holes),
+        )  # fmt: skip
+
+    def _stand(self, low: Floats, high: Floats) -> list[Member]:
+        """Two uprights behind the plate's edges, a foot under each, and a bar between them."""
+        profile = self.system.profile
+        size = (profile.width_mm, profile.height_mm)
+        depth = -self.system.thickness_mm - profile.height_mm / 2.0
+        floor = self.around.floor_z_mm - float(self.face[2, 3])
+        out = []
+        for name, x in (("left", high[0]), ("right", low[0])):
+            at = x + (-profile.width_mm / 2.0 if x > 0.0 else profile.width_mm / 2.0)
+            lines = {
+                "upright": ([at, floor, depth], [at, high[1], depth]),
+                "foot": ([at + (profile.width_mm if x > 0.0 else -profile.width_mm),
+                          floor + profile.height_mm / 2.0, depth - 350.0],
+                         [at + (profile.width_mm if x > 0.0 else -profile.width_mm),
+                          floor + profile.height_mm / 2.0, depth + 350.0]),
+            }  # fmt: skip
+            for role, line in lines.items():
+                axis = carried(self.face, np.array(line))
+                out.append(Member(f"{name} {role}", profile.id, role, axis, X, size))
+        half = profile.width_mm
+        z = floor + 2.0 * profile.height_mm
+        axis = carried(self.face, np.array([[high[0] - half, z, depth], [low[0] + half, z, depth]]))
+        out.append(Member("cross bar", profile.id, "cross bar", axis, Z, size[::-1]))
+        return out
+
+    def _stand_joints(self, stand: list[Member]) -> list[Joint]:
+        system = self.system
+        two = {system.corner.id: 2, system.screw: 4, system.t_nut: 4}
+        left, left_foot, right, right_foot, cross = stand
+        out = []
+        for upright, foot, end in ((left, left_foot, 0), (right, right_foot, 1)):
+            out.append(Joint(f"{foot.id} a", foot.id, upright.id, upright.axis_mm[0], 350.0, None,
+                             two))  # fmt: skip
+            along = float(cross.axis_mm[end, 2] - upright.axis_mm[0, 2])
+            out.append(Joint(f"{upright.id} a", upright.id, cross.id, cross.axis_mm[end], along,
+                             None, two))  # fmt: skip
+            bolts = {system.screw: 2, system.t_nut: 2}
+            out.append(
+                Joint(f"{upright.id} b", upright.id, "plate", upright.axis_mm[1],
+                      upright.length_mm, None, bolts)
+            )  # fmt: skip
+        return out
+
+    def _joints(self, posted: Posted) -> tuple[Joint, ...]:
+        system, name = self.system, posted.mount.name
+        post, foot = posted.member(), posted.foot()
+        base = posted.base()
+        return (
+            Joint(f"{name} a", "plate", post.id, foot[:3, 3], None, None, {system.screw: 2}),
+            Joint(f"{name} b", post.id, posted.wedge_id, base[:3, 3],
+                  post.length_mm - posted.wedge_back_mm, None,
+                  {system.screw: 4, system.t_nut: 4}),
+            Joint(f"{name} c", posted.wedge_id, name, (base @ posted.seat())[:3, 3], None, None,
+                  {CAMERA_SCREW: 1}),
+        )  # fmt: skip
+
+    def _measured(self, posted: Posted) -> CameraMount:
+        front, name = lens_front(posted.mount.camera), posted.mount.name
+        low, _ = self._extent()
+        corner = carried(self.face, np.array([[low[0], low[1], 0.0]]))[0]
+        tapes = (
+            Tape("datum", f"lens front of {name}",
+                 float(np.linalg.norm(front - self.around.datum_mm))),
+            Tape("lower left corner of the plate's face, seen from the subject",
+                 f"lens front of {name}", float(np.linalg.norm(front - corner))),
+        )  # fmt: skip
+        carried_by = ("plate", posted.post_id, posted.wedge_id)
+        return replace(posted.mount, carried_by=carried_by, tapes=tapes)
