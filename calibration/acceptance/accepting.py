@@ -69,7 +69,7 @@ def accept(
         cameras[observations.camera],
         point,
         observations.pixel,
-        observations.sigma_px * calibration.sigma_factor[cameras[observations.camera]][:, None],
+        calibration.noise.sigmas_px(observations.sigma_px, cameras[observations.camera]),
         count * len(observations.frames),
     )
     if cancel.is_set():

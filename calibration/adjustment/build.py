@@ -180,11 +180,6 @@ def _scale_source(observations: Observations, lengths: Lengths, options: Calibra
     )
 
 
-def with_sigmas(network: Network, factor: Floats) -> Network:
-    """The network with the sigmas of image points times ``factor`` (n,) of their cameras."""
-    return replace(network, sigma_px=network.sigma_px * factor[network.sight.camera][:, None])
-
-
 def some_rows(network: Network, keep: Bools) -> Network:
     """The network with some of its image points (n,) only."""
     sight = network.sight

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calibration.adjustment.build import Start, some_rows, with_sigmas
+from calibration.adjustment.build import Start, some_rows
 from calibration.adjustment.camera import CalibratedCamera
 from calibration.adjustment.components import image_components, prior_components
 from calibration.adjustment.covariance import Covariance
@@ -15,6 +15,7 @@ from calibration.adjustment.finite import finite_rows
 from calibration.adjustment.inspection import inspect
 from calibration.adjustment.levenberg import Solution, Stop, adjust
 from calibration.adjustment.network import Network
+from calibration.adjustment.noise import NoiseModel
 from calibration.adjustment.options import CalibrationOptions
 from calibration.adjustment.plausibility import lengths_must_agree, must_be_plausible
 from calibration.adjustment.quality import (
@@ -37,7 +38,7 @@ from calibration.adjustment.settling import late_points, settle
 from calibration.adjustment.stages import NEAR_DAMPING, adjust_in_stages
 from calibration.adjustment.start.finding import find_start
 from calibration.observations import Observations
-from geometry.arrays import Bools, Floats, Ints
+from geometry.arrays import Bools, Ints
 from geometry.errors import InputError
 from solver.progress import CancelToken, Progress, ProgressCallback, ignore_progress
 
@@ -55,7 +56,7 @@ class _Adjusted:
     solution: Solution
     covariance: Covariance
     reliability: Reliability
-    factor: Floats
+    noise: NoiseModel
     rejected: Ints
     late: tuple[LateView, ...]
     iterations: int
@@ -105,7 +106,8 @@ def _adjusted(
 ) -> _Adjusted:
     """Adjusted, tested, and adjusted again until sigmas and blunders are settled."""
     network, state = start.network, start.state
-    factor, rejected = np.ones(network.camera_count), np.empty(0, np.int64)
+    stated, rejected = network.sigma_px, np.empty(0, np.int64)
+    noise, own = NoiseModel.stated(network.camera_count), False
     solution = adjust_in_stages(
         network, state, options.loss, bool(options.start), _later(progress), cancel
     )
@@ -114,20 +116,21 @@ def _adjusted(
     for round_ in range(ROUNDS + 1):
         covariance = solution.reduction.covariance()
         found = reliability(solution, covariance, network)
-        equal = bool(np.ptp(factor) == 0.0)
-        bad, change = settle(solution, network, found, options, equal)
+        bad, change = settle(solution, network, found, options, not own)
         settled = not (bad.any() or np.abs(change - 1.0).max() > SETTLED)
         if settled or round_ == ROUNDS or solution.stop is Stop.STUCK:
             break
         late += _views(observations, start, network, late_points(solution, network) & bad)
         rejected = np.concatenate([rejected, start.rows[bad]])
-        factor = factor * change
-        network = some_rows(with_sigmas(network, change), ~bad)
+        own = own or bool(np.ptp(change) > 0.0)
+        noise = noise.changed(change, stated, network.sight.camera)
+        network = replace(network, sigma_px=noise.sigmas_px(stated, network.sight.camera))
+        network, stated = some_rows(network, ~bad), stated[~bad]
         start = replace(start, rows=start.rows[~bad])
         solution = adjust(network, solution.state, near, cancel=cancel)
         iterations += solution.iterations
     return _Adjusted(
-        start, network, solution, covariance, found, factor, rejected, tuple(late), iterations
+        start, network, solution, covariance, found, noise, rejected, tuple(late), iterations
     )
 
 
@@ -172,7 +175,7 @@ def _result(
         np.where(seen[:, None], solution.state.target, np.nan),
         _places(observations, done),
         done.covariance,
-        done.factor,
+        done.noise,
         "inner constraints on all cameras" if network.datum else "reference poses",
         _quality(observations, options, done, cameras),
         ResidualTable(done.start.rows, solution.residuals.pixel, done.reliability, done.rejected),

@@ -10,6 +10,7 @@ from calibration.adjustment.camera import INTERIOR, PER_CAMERA, CalibratedCamera
 from calibration.adjustment.components import Component
 from calibration.adjustment.covariance import Covariance
 from calibration.adjustment.levenberg import Stop
+from calibration.adjustment.noise import NoiseModel
 from calibration.adjustment.reliability import Reliability
 from calibration.adjustment.residualgrid import GridCell
 from calibration.observations import TargetSet
@@ -144,8 +145,8 @@ class Calibration:
 
     ``target_mm`` (m, 3) in carrier frames, NaN for targets that were not seen.
     ``covariance`` is in the datum named by ``datum``; it covers cameras and targets in the order
-    of ``cameras`` and ``targets.ids``. ``sigma_factor`` (n,) corrects stated sigmas of image
-    points, camera by camera. ``residuals`` is None after reading from a file.
+    of ``cameras`` and ``targets.ids``. ``noise`` corrects stated sigmas of image points, camera by
+    camera. ``residuals`` is None after reading from a file.
     """
 
     cameras: tuple[CalibratedCamera, ...]
@@ -153,14 +154,13 @@ class Calibration:
     target_mm: Floats
     places: tuple[Place, ...]
     covariance: Covariance
-    sigma_factor: Floats
+    noise: NoiseModel
     datum: str
     quality: CalibrationQuality
     residuals: ResidualTable | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "target_mm", frozen(self.target_mm))
-        object.__setattr__(self, "sigma_factor", frozen(self.sigma_factor))
 
     def camera(self, name: str) -> CalibratedCamera:
         """One camera by its name; KeyError when there is none."""

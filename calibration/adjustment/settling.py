@@ -68,15 +68,15 @@ def settle(
         change = np.full(count, whole.factor if whole.significant else 1.0)
     else:
         change = _own_factors(each)
-    return bad, np.maximum(change, _least_factors(network))
+    return bad, np.maximum(change, _least_factor(network))
 
 
-def _least_factors(network: Network) -> Floats:
-    """How much smaller the sigmas in use may become, (cameras,)."""
+def _least_factor(network: Network) -> float:
+    """How much smaller the sigmas in use may become."""
     rows = network.camera_rows
     own = [network.sigma_px[rows[k] : rows[k + 1]] for k in range(network.camera_count)]
     usual = np.array([np.median(sigmas) if sigmas.size else LEAST_SIGMA_PX for sigmas in own])
-    return np.minimum(1.0, LEAST_SIGMA_PX / usual)
+    return float(np.minimum(1.0, LEAST_SIGMA_PX / usual).max())
 
 
 def _own_factors(each: list[Component]) -> Floats:

@@ -109,7 +109,7 @@ def epoch_of(calibration: Calibration, observations: Observations) -> Epoch:
         placements.of_row,
         view.reshape(-1).astype(np.int64),
         seen.pixel,
-        seen.sigma_px * calibration.sigma_factor[camera][:, None],
+        calibration.noise.sigmas_px(seen.sigma_px, camera),
         views[:, 0],
         views[:, 1],
         placements.carrier,

@@ -11,6 +11,7 @@ import numpy as np
 from annotated_types import Len
 
 from calibration.adjustment.camera import CalibratedCamera, Interior
+from calibration.adjustment.noise import NoiseModel
 from calibration.adjustment.result import Calibration, CalibrationQuality, Place
 from calibration.files.packing import PackedCovariance, compact, packed, unpacked
 from calibration.files.strict import StrictModel, model_of, parsed, plain, record_of
@@ -41,7 +42,8 @@ class CameraModel(StrictModel):
     affinity: float
     position_rig_mm: Vector
     rotation_rig_to_camera: Matrix
-    sigma_factor: float
+    sigma_scale: float
+    sigma_added_px: float
 
 
 class CarrierModel(StrictModel):
@@ -118,10 +120,7 @@ def calibration_document(record: CalibrationRecord) -> dict[str, Any]:
         "name": record.name,
         "made_utc": record.made_utc,
         "datum": calibration.datum,
-        "cameras": [
-            _camera(c, float(f))
-            for c, f in zip(calibration.cameras, calibration.sigma_factor, strict=True)
-        ],
+        "cameras": [_camera(c, calibration.noise, k) for k, c in enumerate(calibration.cameras)],
         "targets": _targets(calibration.targets),
         "target_mm": _sparse(calibration.target_mm),
         "places": [
@@ -138,7 +137,7 @@ def calibration_document(record: CalibrationRecord) -> dict[str, Any]:
     }
 
 
-def _camera(camera: CalibratedCamera, factor: float) -> dict[str, Any]:
+def _camera(camera: CalibratedCamera, noise: NoiseModel, index: int) -> dict[str, Any]:
     interior = camera.interior
     return {
         "name": camera.name,
@@ -149,7 +148,8 @@ def _camera(camera: CalibratedCamera, factor: float) -> dict[str, Any]:
         "affinity": interior.affinity,
         "position_rig_mm": camera.pose.position_rig_mm.tolist(),
         "rotation_rig_to_camera": camera.pose.rotation_rig_to_camera.tolist(),
-        "sigma_factor": factor,
+        "sigma_scale": float(noise.scale[index]),
+        "sigma_added_px": float(noise.added_px[index]),
     }
 
 
@@ -214,7 +214,10 @@ def calibration_from(text: str | bytes, source: str) -> CalibrationRecord:
             for p in model.places
         ),
         covariance,
-        np.array([c.sigma_factor for c in model.cameras]),
+        NoiseModel(
+            np.array([c.sigma_scale for c in model.cameras]),
+            np.array([c.sigma_added_px for c in model.cameras]),
+        ),
         model.datum,
         record_of(CalibrationQuality, model.quality),
     )
@@ -241,10 +244,10 @@ def _must_agree(model: CalibrationModel, targets: TargetSet, source: str) -> Non
             f"{source}: cameras or target coordinates do not fit one another",
             "give the file as it was written",
         )
-    if any(not c.sigma_factor > 0.0 for c in model.cameras):
+    if any(c.sigma_scale <= 0.0 or c.sigma_added_px < 0.0 for c in model.cameras):
         raise InputError(
             "calibration-file",
-            f"{source}: a sigma_factor is not positive",
+            f"{source}: a sigma_scale is not positive, or a sigma_added_px negative",
             "give the file as it was written",
         )
 

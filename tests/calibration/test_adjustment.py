@@ -9,7 +9,13 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from calibration.adjustment import CalibrationOptions, InteriorModel, ReferencePoses, calibrate
+from calibration.adjustment import (
+    Calibration,
+    CalibrationOptions,
+    InteriorModel,
+    ReferencePoses,
+    calibrate,
+)
 from calibration.adjustment.build import Start
 from calibration.adjustment.camera import PER_CAMERA
 from calibration.adjustment.datum import inner_constraints
@@ -186,12 +192,35 @@ def test_smallest_blunders_follow_baarda(solved: tuple[Network, Solution]) -> No
     assert smallest[row, 0] == pytest.approx(expected)
 
 
+def sigmas_in_use(found: Calibration, stated_px: float) -> np.ndarray:
+    """Of an image point of each camera."""
+    count = len(found.cameras)
+    return found.noise.sigmas_px(np.full((count, 2), stated_px), np.arange(count))[:, 0]
+
+
+def test_what_nobody_stated_is_added_to_all_points_alike() -> None:
+    """Half the points are stated ten times as good; all are spoilt by as much."""
+    observations = SCENE.observe(0.1, 8)
+    stated = np.full_like(observations.sigma_px, 0.05)
+    stated[::2] = 0.005
+    found = calibrate(
+        replace(observations, sigma_px=stated),
+        CalibrationOptions(start=SCENE.cameras, cross_validate=False),
+    )
+    sharp, blunt = sigmas_in_use(found, 0.005), sigmas_in_use(found, 0.05)
+    np.testing.assert_allclose(sharp, 0.1, rtol=0.2)
+    assert (blunt / sharp < 1.3).all()
+    right = calibrate(observations, CalibrationOptions(start=SCENE.cameras, cross_validate=False))
+    sigmas = [np.sqrt(np.diag(c.covariance.cameras)[9::15]) for c in (found, right)]
+    np.testing.assert_allclose(sigmas[0] / sigmas[1], 1.0, atol=0.15)
+
+
 def test_a_wrong_stated_sigma_is_corrected() -> None:
     observations = SCENE.observe(0.1, 5)
     wrong = replace(observations, sigma_px=np.full_like(observations.sigma_px, 0.05))
     found = calibrate(wrong, CalibrationOptions(start=SCENE.cameras, cross_validate=False))
     # 2500 image points tell a sigma to 1.4 %; three of those, and Huber's share.
-    np.testing.assert_allclose(found.sigma_factor, 2.0, rtol=0.05)
+    np.testing.assert_allclose(sigmas_in_use(found, 0.05), 0.1, rtol=0.05)
     right = calibrate(observations, CalibrationOptions(start=SCENE.cameras, cross_validate=False))
     ratio = np.diag(found.covariance.cameras)[9::15] / np.diag(right.covariance.cameras)[9::15]
     np.testing.assert_allclose(ratio, 1.0, atol=0.15)
@@ -208,8 +237,9 @@ def test_one_noisy_camera_gets_a_sigma_of_its_own() -> None:
         CalibrationOptions(start=SCENE.cameras, cross_validate=False),
     )
     # Estimated once, while all cameras still have equal weights: a little low, never high.
-    assert found.sigma_factor[2] == pytest.approx(np.sqrt(0.1**2 + 0.3**2) / 0.1, rel=0.15)
-    assert np.abs(np.delete(found.sigma_factor, 2) - 1.0).max() < 0.1
+    now = sigmas_in_use(found, 0.1)
+    assert now[2] == pytest.approx(np.sqrt(0.1**2 + 0.3**2), rel=0.15)
+    assert np.abs(np.delete(now, 2) / 0.1 - 1.0).max() < 0.1
 
 
 def test_reference_poses_can_be_the_datum() -> None:
