@@ -157,24 +157,25 @@ def bias(errors: Floats) -> float:
 def accuracy_table(measured: list[Shot]) -> list[str]:
     """Markdown: all pictures of a kind together, then the worst condition of each."""
     rows = [
-        "| target | found | rms px | bias px | worst condition: rms px | limit "
+        "| target | found | rms px | bias px | worst condition: rms px | bias px | limits "
         "| OpenCV: found | rms px | bias px |",
-        "|---|---|---|---|---|---|---|---|---|",
+        "|---|---|---|---|---|---|---|---|---|---|",
     ]
     for name in kinds():
         mine = [s for s in measured if s.kind == name]
         own, other = (np.concatenate([getattr(s, k) for s in mine]) for k in ("own", "plain"))
         count = sum(s.count for s in mine)
         cells = {
-            (b, t): rms(np.concatenate([s.own for s in mine if (s.blur_px, s.tilt_deg) == (b, t)]))
+            (b, t): np.concatenate([s.own for s in mine if (s.blur_px, s.tilt_deg) == (b, t)])
             for b in BLURS_PX
             for t in TILTS_DEG
         }
-        (blur, tilt), worst = max(cells.items(), key=lambda item: item[1])
+        (blur, tilt), worst = max(cells.items(), key=lambda item: rms(item[1]))
         rows.append(
             f"| {name} | {len(own)} of {count} | {rms(own):.4f} | {bias(own):.4f} "
-            f"| {worst:.4f} (blur {blur:g}, tilt {tilt:g} deg) "
-            f"| {LIMITS_PX.get(name, CENTRE_LIMIT_PX):g} "
+            f"| {rms(worst):.4f} (blur {blur:g}, tilt {tilt:g} deg) "
+            f"| {max(map(bias, cells.values())):.4f} "
+            f"| {LIMITS_PX.get(name, CENTRE_LIMIT_PX):g}, {BIAS_LIMIT_PX:g} "
             f"| {len(other)} | {rms(other):.4f} | {bias(other):.4f} |"
         )
     return rows

@@ -14,7 +14,7 @@ from calibration.detection.template import TemplateFit, Window, fit_template
 from calibration.targets.patterns import Pattern
 from geometry.arrays import Floats
 
-LARGEST_WINDOW_PX = 110
+LARGEST_WINDOW_PX = 60
 """Larger windows are binned: their targets have pixels to spare, and the time grows with them."""
 
 _MARGIN_PX = 2

@@ -17,8 +17,7 @@ but lenses, paper and sensors are not even to much better than that."""
 class Finding:
     """Something about the whole picture that explains why targets are missing.
 
-    ``code`` is a stable slug: mirrored, legacy, swapped, other-board, inverted, dictionary,
-    marker-size.
+    ``code`` is a stable slug: mirrored, legacy, swapped, other-board, inverted, dictionary.
     """
 
     code: str

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor, Future
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +21,7 @@ from geometry.errors import CancelledError, InputError
 from solver.progress import CancelToken, NeverCancelled, Progress, ProgressCallback, ignore_progress
 
 _POLL_S = 0.1
+_EXPLAINED = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,10 +174,11 @@ def _check_seen(jobs: Sequence[DetectionJob], found: Sequence[Detections]) -> No
         mine = [k for k, job in enumerate(jobs) if job.picture.camera == camera]
         if any(len(found[k]) for k in mine):
             continue
-        job = jobs[mine[0]]
-        explained = DetectionJob(job.picture, job.plan, job.gates, explain=True)()
-        if explained.findings:
-            raise explained.findings[0].error(f"camera {camera}")
+        # A picture with rejections shows more than one without, and explains better.
+        for k in sorted(mine, key=lambda k: -len(found[k].rejections))[:_EXPLAINED]:
+            explained = replace(jobs[k], explain=True)()
+            if explained.findings:
+                raise explained.findings[0].error(f"camera {camera}")
         rejected = Counter(r.rule.value for k in mine for r in found[k].rejections)
         seen = ""
         if rejected:
@@ -184,7 +186,7 @@ def _check_seen(jobs: Sequence[DetectionJob], found: Sequence[Detections]) -> No
             seen = f"; {sum(rejected.values())} were rejected, most by rule {rule}"
         raise InputError(
             "targets-none",
-            f"camera {camera} shows no target of set {job.plan.name!r} in its {len(mine)} "
+            f"camera {camera} shows no target of set {jobs[0].plan.name!r} in its {len(mine)} "
             f"pictures{seen}",
             "check that the targets are in view, sharp and well lit, and that the target file "
             "is theirs",

@@ -15,8 +15,8 @@ _SAMPLES_PER_BIT = 8
 _LARGEST_FLAW = 0.12
 _CELL_PX = 32.0
 _SPOKES = 16
-_SURE = 0.8
-"""Share of a sector's samples that must agree on its bit."""
+LARGEST_DOUBT = 0.3
+"""Share of a sector's samples that may say otherwise; the fit of the whole target decides then."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,7 +197,7 @@ def _read(dark: np.ndarray, bits: int) -> Reading:
 
 def sure(reading: Reading) -> bool:
     """Whether each sector's samples agree well enough."""
-    return reading.doubt <= 1.0 - _SURE + 1e-9
+    return reading.doubt <= LARGEST_DOUBT
 
 
 def _ring(grey: Bytes, dots: Dots, radius: float, samples: int) -> Floats:

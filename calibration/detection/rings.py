@@ -12,6 +12,7 @@ from calibration.detection.found import Point
 from calibration.detection.gates import Gates, Rejection, Rule
 from calibration.detection.images import Picture
 from calibration.detection.ringreading import (
+    LARGEST_DOUBT,
     Dots,
     Reading,
     find_dots,
@@ -50,7 +51,9 @@ def ring_points(
         where = dots.centres_px[k]
         if not choices:
             best = min((readings[k] for readings in read.values()), key=lambda r: r.doubt)
-            rejections.append(rejected("ring target", (Rule.CODE, best.doubt, 0.2), where))
+            rejections.append(
+                rejected("ring target", (Rule.CODE, best.doubt, LARGEST_DOUBT), where)
+            )
             rejected_dots.append(k)
             continue
         tried = [
