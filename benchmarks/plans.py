@@ -92,8 +92,8 @@ def dome(spec: RigSpec, prepared: PreparedSubject) -> tuple[tuple[RigCamera, ...
     """A hundred cameras in rows about the face, and limits that fit them."""
     target = prepared.subject.design_points.centroid_mm
     cameras = []
-    for row, elevation in enumerate(np.radians(np.linspace(-45.0, 45.0, 10))):
-        for column, azimuth in enumerate(np.radians(np.linspace(-72.0, 72.0, 10))):
+    for row, elevation in enumerate(np.radians(np.linspace(-40.0, 40.0, 10))):
+        for column, azimuth in enumerate(np.radians(np.linspace(-58.0, 58.0, 10))):
             way = np.array(
                 [
                     np.sin(azimuth) * np.cos(elevation),

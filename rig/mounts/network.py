@@ -13,7 +13,7 @@ from itertools import permutations
 
 import numpy as np
 
-from geometry.arrays import Bools, Floats
+from geometry.arrays import Bools, Floats, Ints
 from geometry.camera import RigCamera
 from geometry.subject import Subject
 from geometry.surface import SurfacePoints
@@ -88,7 +88,9 @@ class Network:
         for i, k in permutations(range(len(names)), 2):
             self._ends[f"{names[i]}-{names[k]}"] = (i, k)
         self._partners, self._company = self._find_partners(scene)
-        self._kept = [self._share(self._framed, t.views) for t in limits.coverage.tiers]
+        self._count: Ints = self._framed.sum(axis=0)
+        self._total: Floats = self._info.sum(axis=0)
+        self._kept = [_share(self._count, t.views) for t in limits.coverage.tiers]
 
     def focused(self, index: int, camera: RigCamera) -> RigCamera:
         """The camera with its focus where the nearest and farthest point are equally sharp."""
@@ -136,9 +138,7 @@ class Network:
             if not row.satisfied:
                 breach -= row.slack / size
             lack += max(0.0, self.margins.get(row.name, 0.0) - row.slack) / size
-        framed = self._framed.copy()
-        framed[index] = self._sees(camera)
-        breach += self._coverage_breach(framed)
+        breach += self._coverage_breach(self._views(index, camera))
         cost = self._cost(index, self._information(camera))
         return Score(round(breach, 9), round(lack, 4), cost)
 
@@ -150,30 +150,31 @@ class Network:
                 worst, name = relative_slack(row), row.name
         if name:
             return name
-        framed = self._framed.copy()
-        framed[index] = self._sees(camera)
+        views = self._views(index, camera)
         for tier in self._limits.coverage.tiers:
-            if self._share(framed, tier.views) < tier.share:
+            if _share(views, tier.views) < tier.share:
                 return f"coverage_{tier.views}/all"
         return ""
 
     def move(self, index: int, camera: RigCamera) -> None:
         """Put a camera elsewhere for good."""
         self.cameras[index] = camera
-        self._framed[index] = self._sees(camera)
-        self._info[index] = self._information(camera)
+        framed, info = self._sees(camera), self._information(camera)
+        self._count += framed.astype(np.int64) - self._framed[index]
+        self._total += info - self._info[index]
+        self._framed[index], self._info[index] = framed, info
 
-    def _coverage_breach(self, framed: Bools) -> float:
+    def _views(self, index: int, camera: RigCamera) -> Ints:
+        """How many cameras see each point, (positions, q), with one of them elsewhere."""
+        return np.asarray(self._count - self._framed[index] + self._sees(camera))
+
+    def _coverage_breach(self, views: Ints) -> float:
         """Relative breach of the limits of coverage, and of what the design reached."""
         breach = 0.0
         for tier, kept in zip(self._limits.coverage.tiers, self._kept, strict=True):
-            share = self._share(framed, tier.views)
             wanted = max(tier.share, kept - COVERAGE_KEPT)
-            breach += max(0.0, wanted - share) / wanted
+            breach += max(0.0, wanted - _share(views, tier.views)) / wanted
         return breach
-
-    def _share(self, framed: Bools, views: int) -> float:
-        return float((framed.sum(axis=0) >= views).mean(axis=-1).min())
 
     def _sees(self, camera: RigCamera) -> Bools:
         scene = Scene(self._subject, (camera,), self._limits)
@@ -189,7 +190,7 @@ class Network:
         return np.asarray(found / scene.length_mm**2)
 
     def _cost(self, index: int, own: Floats) -> float:
-        total = self._info.sum(axis=0) - self._info[index] + own
+        total = self._total - self._info[index] + own
         total[:, range(3), range(3)] += self._prior
         return float(np.linalg.norm(np.linalg.inv(total), axis=(1, 2)).mean())
 
@@ -219,6 +220,11 @@ class Network:
 
 def _true(row: Bools) -> list[int]:
     return [int(k) for k in np.flatnonzero(row)]
+
+
+def _share(views: Ints, enough: int) -> float:
+    """Share of the points with so many views, in the worst head position."""
+    return float((views >= enough).mean(axis=-1).min())
 
 
 def _speaks_of_all(limits: Limits) -> bool:

@@ -20,12 +20,12 @@ from rig.mounts.planmodel import (
     PlanFile,
     PriceModel,
     SettingModel,
-    StructureModel,
     TapeModel,
     ToleranceModel,
     WantedModel,
 )
 from rig.mounts.settings import CameraMount
+from rig.mounts.structuremodel import StructureModel
 from rig.rotations import nearest_rotation
 from rig.strict import validated
 

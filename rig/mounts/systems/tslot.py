@@ -34,6 +34,10 @@ FOOT_MM = (300.0, 350.0)
 SHORT_FOOT_MM = 60.0
 """How far a foot reaches forward where another bay stands beside: together they stand firm."""
 
+LOOSE_BAYS = (
+    "The bays stand by themselves with short feet towards the subject: screw the feet to the floor "
+    "or weigh them down behind."
+)
 NARROWEST_MM = 500.0
 END_MM = 20.0
 SIDE_DEG = 60.0
@@ -233,7 +237,8 @@ class TSlotHolding:
             tuple(joints), tuple(solids),
         )  # fmt: skip
         mounts = tuple(self._measured(h) for h in self.hung)
-        return Built(structure, mounts, pairs(*touching))
+        notes = (LOOSE_BAYS,) if len(self.bays) > 1 else ()
+        return Built(structure, mounts, pairs(*touching), notes)
 
     def _measured(self, hung: Hung) -> CameraMount:
         upright = next(u for u in self.uprights if u.id == hung.rail)

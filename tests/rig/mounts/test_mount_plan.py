@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,7 +14,7 @@ from rigs import face, face_cameras, face_limits
 from geometry.errors import CancelledError, InputError
 from rig.mounts.making import make_plan
 from rig.mounts.plan import MountPlan
-from rig.mounts.planfile import plan_document, plan_from_mapping
+from rig.mounts.planfile import plan_document, plan_from_mapping, read_plan
 from rig.mounts.systemfile import parse_system
 from solver.progress import Progress
 from solver.quality import evaluate
@@ -73,6 +75,34 @@ def test_an_unknown_key_in_a_plan_file_is_named() -> None:
     document = plan_document(plan())
     with pytest.raises(InputError, match="stepz is not known"):
         plan_from_mapping(document | {"stepz": []}, "plan.json")
+
+
+def test_a_plan_file_is_read_from_disk_or_named(tmp_path: Path) -> None:
+    path = tmp_path / "plan.json"
+    path.write_text(json.dumps(plan_document(plan())))
+    assert plan_document(read_plan(path)) == plan_document(plan())
+    with pytest.raises(InputError, match="cannot read the plan file"):
+        read_plan(tmp_path / "none.json")
+    path.write_text("{")
+    with pytest.raises(InputError, match="not JSON"):
+        read_plan(path)
+
+
+def test_a_pose_that_its_settings_do_not_give_is_refused() -> None:
+    document = plan_document(plan())
+    document["mounts"][0]["settings"][0]["value"] += 1.0
+    with pytest.raises(InputError, match="do not give its pose"):
+        plan_from_mapping(document)
+
+
+def test_a_camera_that_stands_already_is_kept_clear_of_and_not_mounted() -> None:
+    subject, limits = face(), face_limits()
+    first, *others = face_cameras(subject, 4)
+    cameras = (replace(first, fixed=True), *others)
+    made = make_plan(cameras, subject, limits, parse_system('kind = "plate"'), trials=0)
+    assert [mount.name for mount in made.mounts] == [camera.name for camera in others]
+    assert first.name in {solid.owner for solid in made.structure.solids}
+    assert not made.clashes
 
 
 def test_progress_never_falls_and_cancel_stops() -> None:
