@@ -10,19 +10,20 @@ def assembly_steps(structure: Structure, mounts: tuple[CameraMount, ...]) -> tup
     """What to do, one step after the other."""
     steps = [_cut(structure.members)] if structure.members else []
     steps += [_drill(plate) for plate in structure.plates]
-    carried = {name for mount in mounts for name in mount.carried_by}
-    frame = {m.id for m in structure.members} | {p.id for p in structure.parts}
-    frame |= {p.id for p in structure.plates}
-    own = {f"{m.name} stub" for m in mounts} | {f"{m.name} arm" for m in mounts}
-    for joint in structure.joints:
-        if joint.on in frame - own and joint.other in frame - own:
-            steps.append(_join(joint))
-    steps += [
-        "Set up the subject's head form or a pointer at the datum, and check that the frame stands "
+    if structure.wedges:
+        steps.append(f"Print the wedges: {', '.join(wedge.id for wedge in structure.wedges)}.")
+    own = {m.name: {part for part in m.carried_by if part.startswith(f"{m.name} ")} for m in mounts}
+    of_one = {m.name for m in mounts}.union(*own.values())
+    steps += [f"J{_join(j)[1:]}." for j in structure.joints if not {j.on, j.other} & of_one]
+    steps.append(
+        "Set up the subject's head form or a pointer at the datum, and check that the mount stands "
         "level and square to it."
-    ]
+    )
     for mount in mounts:
-        steps.append(_hang(mount, structure, carried))
+        mine = own[mount.name] | {mount.name}
+        joints = [j for j in structure.joints if {j.on, j.other} & mine]
+        steps.append(f"Hang {mount.name}: " + "; ".join(_join(j) for j in joints) + ".")
+        steps.append(_set(mount))
         steps.append(_check(mount))
     return tuple(f"{k}. {text}" for k, text in enumerate(steps, 1))
 
@@ -38,32 +39,29 @@ def _drill(plate: Plate) -> str:
         + (f" {h.thread}" if h.thread else "")
         for h in plate.holes
     )
-    return f"Drill plate {plate.id} ({plate.material}, {plate.thickness_mm:g} mm): {holes}."
+    return f"Drill {plate.id} ({plate.material}, {plate.thickness_mm:g} mm): {holes}."
 
 
 def _join(joint: Joint) -> str:
     where = "" if joint.along_mm is None else f", {joint.along_mm:.0f} mm from its start"
-    angle = "" if joint.angle_deg is None else f", at {joint.angle_deg:g} degrees"
+    angle = "" if joint.angle_deg is None else f", at {joint.angle_deg:.1f} degrees"
     parts = ", ".join(f"{count} x {part}" for part, count in joint.fasteners.items())
-    return f"Join {joint.other} to {joint.on}{where}{angle}" + (f" with {parts}." if parts else ".")
+    return f"join {joint.other} to {joint.on}{where}{angle}" + (f" with {parts}" if parts else "")
+
+
+def _set(mount: CameraMount) -> str:
+    figures = "; ".join(_value(setting) for setting in mount.settings)
+    if all(setting.step == 0.0 for setting in mount.settings):
+        return (
+            f"Nothing is set on {mount.name}; check its figures as drilled and printed: {figures}."
+        )
+    return f"Set {mount.name}: {figures}."
 
 
 def _value(setting: Setting) -> str:
     unit = "mm" if setting.unit == "mm" else "degrees"
     digits = 0 if setting.step >= 1.0 else 1
     return f"{setting.name} {setting.value:.{digits}f} {unit} (from {setting.measured_from})"
-
-
-def _hang(mount: CameraMount, structure: Structure, carried: set[str]) -> str:
-    chain = ", ".join(name for name in mount.carried_by if name in carried)
-    angles = [
-        f"{j.other} at {j.angle_deg:g} degrees on {j.on}"
-        for j in structure.joints
-        if j.angle_deg is not None and j.other in mount.carried_by
-    ]
-    pitched = f" Fix {'; '.join(angles)}." if angles else ""
-    settings = "; ".join(_value(s) for s in mount.settings)
-    return f"Hang {mount.name} on {chain}.{pitched} Set {settings}."
 
 
 def _check(mount: CameraMount) -> str:

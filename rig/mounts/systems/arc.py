@@ -108,9 +108,11 @@ class ArcSystem:
         low = max(float(np.floor(min(height.min(), 0.0) - END_DEG)), -80.0)
         high = min(float(np.ceil(max(height.max(), 0.0) + END_DEG)), 85.0)
         count = int(np.ceil((high - low) / FACET_DEG))
-        # The middle of a facet lies nearer to the centre than its corners.
-        radius = needed / float(np.cos(np.radians((high - low) / count / 2.0)))
-        radius = self.radius_mm or float(np.ceil(radius / 10.0) * 10.0)
+        half = float(np.radians((high - low) / count / 2.0))
+        # The middle of a facet lies nearer to the centre than its corners; facets are cut to
+        # whole millimetres.
+        radius = self.radius_mm or needed / float(np.cos(half))
+        radius = float(np.ceil(2.0 * radius * np.sin(half)) / (2.0 * np.sin(half)))
         profile = self.outrigger.profile
         return Rib("", profile, centre, 0.0, radius, low, high, count, self.step_mm)
 

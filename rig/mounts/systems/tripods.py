@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Self
 
 import numpy as np
@@ -13,7 +14,7 @@ from geometry.camera import RigCamera
 from geometry.errors import InputError
 from rig.catalogue.items import Bracket
 from rig.mounts.clashes import Site, pairs
-from rig.mounts.kinematics import frames_along, reach, rotated
+from rig.mounts.kinematics import frames_along, reach, rotated, standing
 from rig.mounts.settings import CameraMount, Link, Motion, Setting, Tape, chain_pose, shift, turn
 from rig.mounts.solids import bar, camera_solids, lens_front
 from rig.mounts.structure import Joint, PlacedPart, Solid, Structure
@@ -28,6 +29,16 @@ LEG_TOP_SHARE = 0.8
 """Where the legs meet the column, as a share of the lowest height of the head's foot."""
 
 LEG_TURNS_DEG = tuple(float(a) for a in range(0, 120, 15))
+LEVEL = "level"
+ANGLE_MM = 15.0
+ANGLE_PLATE = "angle-plate-head"
+FEET = (
+    (LEVEL, np.eye(3)),
+    ("right", standing(X, Y)),
+    ("left", standing(-X, Y)),
+)
+"""A head stands on its column, or lies to one side on an angle plate: for cameras rolled far."""
+
 FARTHEST_MM = 5000.0
 ROOM_MM = 14.0
 
@@ -40,6 +51,7 @@ class Stood:
     legs_deg: float
     stand: Bracket
     head: HeadKind
+    foot_name: str = LEVEL
 
     @property
     def stand_id(self) -> str:
@@ -56,9 +68,13 @@ class Stood:
         at = frames_along(self.mount.chain, self.mount.values())[3]
         return np.asarray(at @ shift(-self.head.pivot_mm * Z))
 
+    def column_top(self) -> Floats:
+        """The top of the column, (3,)."""
+        return np.asarray(self.foot()[:3, 3] + self.mount.values()["column"] * Z)
+
     def solids(self) -> tuple[Solid, ...]:
         """Column, legs and head."""
-        foot, top = self.foot()[:3, 3], self.top()[:3, 3]
+        foot, top = self.foot()[:3, 3], self.column_top()
         out = [bar(self.stand_id, "member", foot + 50.0 * Z, top, X, (COLUMN_MM, COLUMN_MM))]
         hip = foot + LEG_TOP_SHARE * lowest_mm(self.stand) * Z
         radius = _size(self.stand)[0] / 2.0
@@ -75,10 +91,14 @@ class Stood:
         """Tripod and head."""
         at = self.foot() @ rotated(turn(Z, self.legs_deg))
         name = self.mount.name
-        return (
-            PlacedPart(self.stand_id, self.stand.id, "tripod", at, name),
-            PlacedPart(head_id(name), self.head.part.id, "head", self.top(), name),
+        stand = PlacedPart(self.stand_id, self.stand.id, "tripod", at, name)
+        head = PlacedPart(head_id(name), self.head.part.id, "head", self.top(), name)
+        if self.foot_name == LEVEL:
+            return stand, head
+        plate = PlacedPart(
+            f"{name} angle plate", ANGLE_PLATE, "angle plate", shift(self.column_top()), name
         )
+        return stand, plate, head
 
     def touching(self) -> tuple[tuple[str, str], ...]:
         """Pairs of owners that touch by intent."""
@@ -145,11 +165,11 @@ class TripodSystem:
         )
 
     def _options(self, camera: RigCamera, around: Surroundings) -> Iterator[Stood]:
-        for stance in stances(self.head, camera, [("level", np.eye(3))]):
+        for stance in stances(self.head, camera, FEET):
             mount = self._mount(camera, stance, around)
             if mount is not None:
                 for legs in LEG_TURNS_DEG:
-                    yield Stood(mount, legs, self.stand, self.head)
+                    yield Stood(mount, legs, self.stand, self.head, stance.foot)
 
     def _mount(
         self, camera: RigCamera, stance: Stance[str], around: Surroundings
@@ -159,7 +179,7 @@ class TripodSystem:
             Link(shift(floor), Motion.SLIDE, X, "across"),
             Link(np.eye(4), Motion.SLIDE, -Y, "back"),
             Link(np.eye(4), Motion.SLIDE, Z, "column"),
-            *self.head.links(np.eye(4), camera),
+            *self.head.links(self._top(stance.foot), camera),
         )
         settings = (*self._slides(), *self.head.settings(stance.angles_deg))
         values = {s.name: s.value for s in settings}
@@ -170,6 +190,14 @@ class TripodSystem:
         moved = tuple(replace(s, value=found[s.name]) for s in settings)
         return CameraMount(placed, camera.pose, moved, chain)
 
+    def _top(self, foot: str) -> Floats:
+        """The head's foot (4, 4) from the top of the column."""
+        rotation = dict(FEET)[foot]
+        if foot == LEVEL:
+            return rotated(rotation)
+        # On the angle plate the head lies beside the column's line, clear of its top.
+        return rotated(rotation, ANGLE_MM * rotation[:, 2] + (self.head.width_mm / 2.0 + 20.0) * Z)
+
     def _slides(self) -> tuple[Setting, ...]:
         mark = "the plumb point of the datum on the floor to the middle of the column"
         low, high = lowest_mm(self.stand), _size(self.stand)[1]
@@ -179,7 +207,7 @@ class TripodSystem:
             Setting("back", "mm", 0.0, self.floor_step_mm, -FARTHEST_MM, FARTHEST_MM,
                     f"{mark}, positive away from the subject"),
             Setting("column", "mm", low, self.column_step_mm, low, high,
-                    "the floor to the foot of the head"),
+                    "the floor to the top of the column"),
         )  # fmt: skip
 
 
@@ -207,8 +235,9 @@ class TripodHolding:
             s for stood in self.stood for s in (*stood.solids(), *camera_solids(stood.mount.camera))
         )
         joints = tuple(
-            Joint(f"{s.mount.name} a", s.stand_id, head_id(s.mount.name), s.top()[:3, 3])
+            Joint(f"{s.mount.name} {mark}", a.id, b.id, b.rig_from_part[:3, 3])
             for s in self.stood
+            for mark, (a, b) in zip("ab", pairwise(s.placed()), strict=False)
         )
         parts = tuple(p for s in self.stood for p in s.placed())
         touching = [pair for s in self.stood for pair in s.touching()]
