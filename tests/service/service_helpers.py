@@ -14,6 +14,7 @@ from typing import TypeVar
 
 import httpx2
 
+from rig.examples import example_text
 from service.store import Store
 from service.store.jobrecords import JobRecord
 
@@ -87,3 +88,20 @@ class LiveServer:
 
 
 StartServer = Callable[..., LiveServer]
+
+
+def small_rig_text() -> str:
+    """The example face rig with few cameras, points and starts, and modest wishes for views."""
+    text = example_text("face")
+    for before, after in (
+        ("cameras = 7", "cameras = 4"),
+        ("starts = 8", "starts = 1"),
+        ("share = 0.95", "share = 0.5"),
+        ("share = 0.999", "share = 0.95"),
+        # The mean of a few points is another one than that of the points that judge.
+        ("tolerance_px = 100.0", "tolerance_px = 600.0"),
+    ):
+        assert text.count(before) == 1
+        text = text.replace(before, after)
+    assert "[subject]" not in text
+    return f"{text}\n[subject]\ndesign_points = 40\ncheck_points = 120\n"

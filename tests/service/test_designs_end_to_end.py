@@ -17,11 +17,17 @@ from typing import Any
 
 import httpx2
 import pytest
-from service_helpers import RIGWRIGHT, LiveServer, StartServer, files_under, wait_for
+from service_helpers import (
+    RIGWRIGHT,
+    LiveServer,
+    StartServer,
+    files_under,
+    small_rig_text,
+    wait_for,
+)
 from starlette.testclient import TestClient
 
 from geometry.head import synthetic_head
-from rig.examples import example_text
 from rig.files import FILE_NAMES
 from service import work
 from service.api.app import create_app
@@ -38,23 +44,6 @@ def head(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("head") / "head.ply"
     work.write_scan(synthetic_head(), path)
     return path
-
-
-def small_rig_text() -> str:
-    """The example face rig with few cameras, points and starts, and modest wishes for views."""
-    text = example_text("face")
-    for before, after in (
-        ("cameras = 7", "cameras = 4"),
-        ("starts = 8", "starts = 1"),
-        ("share = 0.95", "share = 0.5"),
-        ("share = 0.999", "share = 0.95"),
-        # The mean of a few points is another one than that of the points that judge.
-        ("tolerance_px = 100.0", "tolerance_px = 600.0"),
-    ):
-        assert text.count(before) == 1
-        text = text.replace(before, after)
-    assert "[subject]" not in text
-    return f"{text}\n[subject]\ndesign_points = 40\ncheck_points = 120\n"
 
 
 @pytest.fixture(scope="module")
