@@ -26,6 +26,7 @@ from calibration.files import (
 )
 from calibration.report import calibration_page, check_page, history_of, history_page
 from calibration.targets.files import read_targets
+from geometry.errors import InputError
 from rig.designfile import read_design
 from service.measuring.figures import acceptance_figures, calibration_figures, check_figures
 from service.measuring.seeing import DETECTING, see, seen_figures
@@ -56,8 +57,15 @@ def _options(request: Request, inputs: Inputs) -> CalibrationOptions:
     if "design" in inputs:
         start = tuple(map(CalibratedCamera.from_rig, read_design(inputs["design"]).cameras))
     sigmas = request.get("poses_known_to")
-    model = dict.fromkeys(request.get("hold") or (), FIXED)
-    model |= dict.fromkeys(request.get("free") or (), FREE)
+    hold, free = request.get("hold") or (), request.get("free") or ()
+    both = sorted(set(hold) & set(free))
+    if both:
+        raise InputError(
+            "calibration-model",
+            f"the lens parameter {both[0]} shall be held and free",
+            "name it in one of the two",
+        )
+    model = dict.fromkeys(hold, FIXED) | dict.fromkeys(free, FREE)
     return CalibrationOptions(
         start=start,
         model=InteriorModel(**model),
