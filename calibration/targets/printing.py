@@ -41,7 +41,7 @@ Separate = MarkerCarrier | RingCarrier
 
 
 def page_size(page: str) -> tuple[float, float]:
-    """Width and height in millimetres of ``A4``, ``A3``, ``letter``, or ``600x400``; ``A4 landscape`` too."""
+    """Width and height in millimetres of ``A4``, ``A3``, ``letter`` or ``600x400``, and turned."""
     name, _, turned = page.strip().partition(" ")
     size = PAGES_MM.get(name.upper())
     if size is None:

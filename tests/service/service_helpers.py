@@ -15,7 +15,10 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import httpx2
+import pytest
+from typer.testing import CliRunner
 
+from service.cli import app, running
 from service.jobs.engine import Report, Task
 from service.store import Store
 from service.store.jobrecords import JobRecord
@@ -71,10 +74,22 @@ def files_under(folder: Path) -> list[Path]:
     return sorted(Path(where) / name for where, _, names in os.walk(folder) for name in names)
 
 
-def one_line_and_nothing_left(folder: Path, *arguments: object) -> str:
+def rigwright_here(*arguments: object, cwd: Path) -> subprocess.CompletedProcess[str]:
+    """The command, its task too, in this process: loading everything anew takes two seconds."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(cwd)
+        patch.setattr(running, "ProcessEngine", InThisProcess)
+        done = CliRunner().invoke(app, [str(argument) for argument in arguments])
+    if done.exception is not None and not isinstance(done.exception, SystemExit):
+        raise done.exception
+    return subprocess.CompletedProcess(list(arguments), done.exit_code, done.stdout, done.stderr)
+
+
+def one_line_and_nothing_left(folder: Path, *arguments: object, here: bool = False) -> str:
     """What a command says that is refused: one line with a remedy, and no file more or less."""
     before = files_under(folder)
-    done = rigwright(*arguments, "--out", "out", cwd=folder)
+    run = rigwright_here if here else rigwright
+    done = run(*arguments, "--out", "out", cwd=folder)
     assert done.returncode == 2, done.stderr
     assert done.stdout == ""
     told = [line for line in done.stderr.splitlines() if line.startswith("rigwright: ")]
