@@ -50,6 +50,7 @@ def plan() -> MountPlan:
     return make_plan(cameras(), face(), limits(), parse_system('kind = "t-slot"'), trials=3)
 
 
+@pytest.mark.slow
 def test_what_is_built_keeps_the_limits() -> None:
     price = plan().price
     assert price.designed.feasible

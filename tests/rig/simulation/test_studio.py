@@ -31,6 +31,7 @@ def studio() -> Studio:
     return Studio(three(lens(480, 30.0, STRONG)), SceneSettings(head=HEAD, motion=MOVING))
 
 
+@pytest.mark.slow
 def test_the_outline_is_where_the_surface_projects(studio: Studio) -> None:
     rig_camera = studio.cameras["cam02"]
     surface = studio.surface
