@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from rig.mounts.settings import CameraMount, Setting
-from rig.mounts.structure import Joint, Member, Plate, Structure
+from rig.mounts.structure import Joint, Member, Plate, Structure, Wedge
 
 
 def assembly_steps(structure: Structure, mounts: tuple[CameraMount, ...]) -> tuple[str, ...]:
@@ -22,7 +22,7 @@ def assembly_steps(structure: Structure, mounts: tuple[CameraMount, ...]) -> tup
     for mount in mounts:
         mine = own[mount.name] | {mount.name}
         joints = [j for j in structure.joints if {j.on, j.other} & mine]
-        steps.append(f"Hang {mount.name}: " + "; ".join(_join(j) for j in joints) + ".")
+        steps.append(f"Hang {mount.name}: {_hang(mount, joints, structure.wedges)}.")
         steps.append(_set(mount))
         steps.append(_check(mount))
     return tuple(f"{k}. {text}" for k, text in enumerate(steps, 1))
@@ -42,11 +42,39 @@ def _drill(plate: Plate) -> str:
     return f"Drill {plate.id} ({plate.material}, {plate.thickness_mm:g} mm): {holes}."
 
 
+def _hang(mount: CameraMount, joints: list[Joint], wedges: tuple[Wedge, ...]) -> str:
+    """The joints of one camera in the order in which they can be made."""
+    wedge = next((w.id for w in wedges if w.camera == mount.name), None)
+    if wedge is None:
+        return "; ".join(_join(joint) for joint in joints)
+    # On its post the wedge hides the camera's screw; the camera leaves the base screws free.
+    first = [_join(j) for j in joints if wedge not in (j.on, j.other)]
+    under = [
+        f"screw {j.other} onto {j.on} from below, the screw's head in the wedge's pocket" + _with(j)
+        for j in joints
+        if j.on == wedge
+    ]
+    last = [
+        f"screw {j.other} onto {j.on} with its camera on it{_where(j)}, by a straight key from "
+        "above" + _with(j)
+        for j in joints
+        if j.other == wedge
+    ]
+    return "; ".join([*first, *under, *last, "plug in the cable last"])
+
+
 def _join(joint: Joint) -> str:
-    where = "" if joint.along_mm is None else f", {joint.along_mm:.0f} mm from its start"
     angle = "" if joint.angle_deg is None else f", at {joint.angle_deg:.1f} degrees"
+    return f"join {joint.other} to {joint.on}{_where(joint)}{angle}" + _with(joint)
+
+
+def _where(joint: Joint) -> str:
+    return "" if joint.along_mm is None else f", {joint.along_mm:.0f} mm from its start"
+
+
+def _with(joint: Joint) -> str:
     parts = ", ".join(f"{count} x {part}" for part, count in joint.fasteners.items())
-    return f"join {joint.other} to {joint.on}{where}{angle}" + (f" with {parts}" if parts else "")
+    return f" with {parts}" if parts else ""
 
 
 def _set(mount: CameraMount) -> str:

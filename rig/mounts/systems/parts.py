@@ -94,6 +94,7 @@ def plate_of(
         screw=screw_for(profile.bolt, catalogue),
         thickness_mm=thickness_mm,
         material=material,
+        catalogue=catalogue,
     )
 
 

@@ -9,8 +9,9 @@ rounded.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from itertools import chain
 from typing import Self
 
 import numpy as np
@@ -18,35 +19,17 @@ import numpy as np
 from geometry.arrays import Floats
 from geometry.camera import RigCamera
 from geometry.errors import InputError
-from geometry.frames import Pose
+from rig.catalogue import Catalogue
 from rig.catalogue.items import Bracket, Profile
 from rig.mounts.clashes import Site, pairs
-from rig.mounts.kinematics import (
-    ANGLES,
-    frame,
-    head_angles,
-    head_links,
-    reach,
-    rotated,
-    turned_over,
-)
-from rig.mounts.settings import CameraMount, Link, Motion, Tape, chain_pose, turn
+from rig.mounts.kinematics import rotated
+from rig.mounts.settings import CameraMount, Tape
 from rig.mounts.solids import bar, box, camera_solids, carried, lens_front
 from rig.mounts.structure import Hole, Joint, Member, PlacedPart, Plate, Structure
 from rig.mounts.surroundings import Surroundings
 from rig.mounts.systems.base import Built
-from rig.mounts.systems.posts import (
-    BASE_LENGTH_MM,
-    CAMERA_SCREW,
-    LONGEST_POST_MM,
-    SCREW_HOLES_MM,
-    Posted,
-    X,
-    Y,
-    Z,
-    post_settings,
-    seat_height,
-)
+from rig.mounts.systems.fits import CAMERA_SCREW, SCREW_HOLES_MM, Fit, Fitter
+from rig.mounts.systems.posts import LONGEST_POST_MM, Posted, X, Y, Z, post_for
 from rig.mounts.tolerancing import MADE_DEG, MADE_MM
 
 PLATE_AXES = np.stack([-X, Z, Y], axis=1)
@@ -54,10 +37,9 @@ PLATE_AXES = np.stack([-X, Z, Y], axis=1)
 
 BEHIND_MM = 25.0
 EDGE_MM = 60.0
-STEEPEST_DEG = 65.0
-"""Steepest wedge: beyond it a printed one leans too far to be strong."""
+SPARE_MM = 20.0
+"""Plate to the end of the hindmost base, for other turns of its post."""
 
-TURNS_DEG = (0.0, 30.0, -30.0, 60.0, -60.0)
 ROOM_MM = 1.0
 
 
@@ -71,6 +53,7 @@ class PlateSystem:
     screw: str
     thickness_mm: float
     material: str
+    catalogue: Catalogue
     kind: str = "plate"
 
     @property
@@ -83,92 +66,57 @@ class PlateSystem:
         everyone = (*cameras, *around.standing)
         solids = tuple(s for camera in everyone for s in camera_solids(camera))
         site = Site(solids, everyone, around, ROOM_MM)
-        face = self._face(cameras, around)
-        posted = []
-        for camera in cameras:
-            best: tuple[int, Posted] | None = None
-            for option in self._options(camera, face):
-                count = site.clashes(option.solids(), pairs(*option.touching()))
-                if best is None or count < best[0]:
-                    best = (count, option)
-                if count == 0:
-                    break
-            if best is None:
-                raise self._too_steep(camera)
-            site.add(best[1].solids())
-            posted.append(best[1])
-        return PlateHolding(self, tuple(posted), face, around)
+        fitter = Fitter(PLATE_AXES, self.profile, self.catalogue)
+        searches = [fitter.fits(camera) for camera in cameras]
+        firsts = [next(search) for search in searches]
+        face = self._face(cameras, firsts, around)
+        held = []
+        for camera, first, others in zip(cameras, firsts, searches, strict=True):
+            best = self._best(camera, chain([first], others), face, site)
+            site.add(best.solids())
+            held.append(best)
+        return PlateHolding(self, tuple(held), face, around)
 
-    def _face(self, cameras: tuple[RigCamera, ...], around: Surroundings) -> Floats:
-        """The plate's frame (4, 4), its origin straight behind the datum."""
-        corners = np.concatenate([s.corners_mm for c in cameras for s in camera_solids(c)])
+    def _face(
+        self, cameras: tuple[RigCamera, ...], fits: list[Fit], around: Surroundings
+    ) -> Floats:
+        """The plate's frame (4, 4), its origin straight behind the datum.
+
+        Behind every camera with its cable, and so far that every base lies on its post.
+        """
+        behind = min(
+            float(s.corners_mm[:, 1].min()) for c in cameras for s in camera_solids(c)
+        ) - BEHIND_MM  # fmt: skip
+        # A camera that is turned over has its thread on the other side.
+        threads = [
+            fit.pose.to_rig(c.camera.body.mount_thread_camera_mm[None])[0, 1]
+            for c, fit in zip(cameras, fits, strict=True)
+        ]
+        ends = [float(y) - fit.footing.rear_mm for y, fit in zip(threads, fits, strict=True)]
         origin = around.datum_mm.copy()
-        origin[1] = float(np.floor(corners[:, 1].min() - BEHIND_MM - BASE_LENGTH_MM))
+        origin[1] = float(np.floor(min(behind, *ends) - SPARE_MM))
         return rotated(PLATE_AXES, origin)
 
-    def _too_steep(self, camera: RigCamera) -> InputError:
-        steep = float(np.degrees(np.arccos(np.clip(camera.pose.axis_rig[1], -1.0, 1.0))))
-        return InputError(
-            "wedge-steep",
-            f"no wedge on a plate can hold {camera.name}: it looks {steep:.0f} degrees off the "
-            "plate's normal",
-            "choose a frame or an arc for it, or ask for a design with cameras in front",
-        )
-
-    def _options(self, camera: RigCamera, face: Floats) -> Iterator[Posted]:
-        for more in TURNS_DEG:
-            for pose in (camera.pose, turned_over(camera.pose)):
-                up = -pose.rotation_rig_to_camera[1]
-                across = float(np.hypot(up[0], up[2]))
-                if across < 0.2:
-                    # It stands on its back: no side of a post is under it.
-                    continue
-                turned = float(np.degrees(np.arctan2(up[2], -up[0]))) + more
-                posted = self._post(camera, pose, turned, face)
-                if posted is not None:
-                    yield posted
-
-    def _post(
-        self, camera: RigCamera, pose: Pose, turned_deg: float, face: Floats
-    ) -> Posted | None:
-        """Post and wedge with the post turned so far; None for one that is too steep."""
-        foot = face[:3, :3] @ turn(Z, turned_deg)
-        base = frame(np.zeros(3), foot[:, 1], foot[:, 2], foot[:, 0])[:3, :3]
-        angles = head_angles(pose.rotation_rig_to_camera, base)
-        if abs(angles[1]) > STEEPEST_DEG or abs(angles[2]) > STEEPEST_DEG:
-            return None
-        body = camera.camera.body
-        seat = seat_height(camera, pose, base)
-        values = dict(zip(ANGLES, (float(a) for a in angles), strict=True))
-        values |= {"across": 0.0, "up": 0.0, "turn": turned_deg, "post": 300.0}
-        back = BASE_LENGTH_MM / 2.0
-        thread = body.mount_thread_camera_mm
-        chain = self._chain(face, back, seat, thread)
-        found = reach(chain, values, ["across", "up", "post"], pose, with_rotation=False)
-        length = float(np.ceil(found["post"] - 1e-9))
-        back += length - found["post"]
-        found["post"] = length
-        if not BASE_LENGTH_MM <= length <= LONGEST_POST_MM:
-            return None
-        chain = self._chain(face, back, seat, thread)
-        mount = CameraMount(
-            camera.moved_to(chain_pose(chain, found)), camera.pose, post_settings(found), chain
-        )
-        return Posted(mount, seat, back, self.profile)
-
-    def _chain(
-        self, face: Floats, back_mm: float, seat_mm: float, thread: Floats
-    ) -> tuple[Link, ...]:
-        side = np.array([self.profile.width_mm / 2.0, 0.0, -back_mm])
-        # The wedge's base: x across the post, y along it, z out of its side.
-        base = frame(side, Y, Z, X)
-        return (
-            Link(face, Motion.SLIDE, X, "across"),
-            Link(np.eye(4), Motion.SLIDE, Y, "up"),
-            Link(np.eye(4), Motion.TURN, Z, "turn"),
-            Link(np.eye(4), Motion.SLIDE, Z, "post"),
-            *head_links(base, seat_mm, seat_mm, thread),
-        )
+    def _best(self, camera: RigCamera, found: Iterable[Fit], face: Floats, site: Site) -> Posted:
+        """The first post and wedge without a clash, else the one with the fewest."""
+        best: tuple[int, Posted] | None = None
+        for fit in found:
+            option = post_for(camera, fit, face, self.profile)
+            if option is None:
+                continue
+            count = site.clashes(option.solids(), pairs(*option.touching()))
+            if best is None or count < best[0]:
+                best = (count, option)
+            if count == 0:
+                break
+        if best is None:
+            raise InputError(
+                "post-long",
+                f"{camera.name} stands too far before the plate for a post of "
+                f"{LONGEST_POST_MM:.0f} mm, the longest there is",
+                "choose a frame or an arc, or ask for a design with cameras less deep",
+            )
+        return best[1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,7 +150,7 @@ class PlateHolding:
             bar(m.id, "member", m.axis_mm[0], m.axis_mm[1], m.across, m.size_mm) for m in stand
         ]
         solids += [s for p in self.posted for s in (*p.solids(), *camera_solids(p.mount.camera))]
-        wedges = tuple(p.wedge(CAMERA_SCREW) for p in self.posted)
+        wedges = tuple(p.wedge() for p in self.posted)
         joints = (*self._stand_joints(stand), *(j for p in self.posted for j in self._joints(p)))
         touching = [t for p in self.posted for t in p.touching()]
         touching += [("plate", p.post_id) for p in self.posted] + [(j.on, j.other) for j in joints]
@@ -288,13 +236,13 @@ class PlateHolding:
     def _joints(self, posted: Posted) -> tuple[Joint, ...]:
         system, name = self.system, posted.mount.name
         post, foot = posted.member(), posted.foot()
-        base = posted.base()
+        base, seat = posted.base(), posted.base() @ posted.fit.wedge.base_from_seat
         return (
             Joint(f"{name} a", "plate", post.id, foot[:3, 3], None, None, {system.screw: 2}),
             Joint(f"{name} b", post.id, posted.wedge_id, base[:3, 3],
-                  post.length_mm - posted.wedge_back_mm, None,
+                  posted.wedge_along_mm, None,
                   {system.screw: 4, system.t_nut: 4}),
-            Joint(f"{name} c", posted.wedge_id, name, (base @ posted.seat())[:3, 3], None, None,
+            Joint(f"{name} c", posted.wedge_id, name, seat[:3, 3], None, None,
                   {CAMERA_SCREW: 1}),
         )  # fmt: skip
 

@@ -2,40 +2,33 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from geometry.arrays import Floats
 from geometry.camera import RigCamera
-from geometry.frames import Pose
 from rig.catalogue.items import Profile
-from rig.convex import box_corners
-from rig.mounts.kinematics import frames_along
-from rig.mounts.settings import CameraMount, Setting, shift
+from rig.mounts.kinematics import ANGLES, frame, frames_along, head_links, reach
+from rig.mounts.settings import CameraMount, Link, Motion, Setting, chain_pose, shift
 from rig.mounts.solids import bar, carried
-from rig.mounts.structure import Hole, Member, Solid, Wedge
+from rig.mounts.structure import Member, Solid, Wedge
+from rig.mounts.systems.fits import Fit
 
 X, Y, Z = np.eye(3)
-BASE_LENGTH_MM = 60.0
-HOLE_SPREAD_MM = 15.0
-LEAST_SEAT_MM = 12.0
-UNDER_MM = 3.0
 LONGEST_POST_MM = 1500.0
-SCREW_HOLES_MM = {"M5": 5.5, "M6": 6.6, "M8": 9.0, "5/16-18": 8.4}
-"""Clearance holes of the medium series, ISO 273; for inches ASME B18.2.8 normal fit."""
-
-CAMERA_SCREW = "stud-1-4-20"
-CAMERA_HOLE_MM = 6.8
 
 
 @dataclass(frozen=True, eq=False)
 class Posted:
-    """One camera on its post and wedge. ``wedge_back_mm``: the post's end to the wedge's middle."""
+    """One camera on its post and wedge. ``back_mm``: the post's end to the camera's thread.
+
+    The wedge is made to its figures, so it is that of ``fit`` at all settings.
+    """
 
     mount: CameraMount
-    seat_mm: float
-    wedge_back_mm: float
+    fit: Fit
+    back_mm: float
     profile: Profile
 
     @property
@@ -46,7 +39,12 @@ class Posted:
     @property
     def wedge_id(self) -> str:
         """Id of the wedge."""
-        return f"{self.mount.name} wedge"
+        return self.fit.wedge.id
+
+    @property
+    def wedge_along_mm(self) -> float:
+        """From the post's foot to the middle of the wedge's base."""
+        return self.mount.values()["post"] - self.back_mm + self.fit.footing.middle_mm
 
     def _frames(self) -> list[Floats]:
         return frames_along(self.mount.chain, self.mount.values())
@@ -57,18 +55,8 @@ class Posted:
 
     def base(self) -> Floats:
         """The wedge's base (4, 4)."""
-        return np.asarray(self._frames()[4] @ shift(-self.seat_mm * Z))
-
-    def seat(self) -> Floats:
-        """The seat in the wedge's base, (4, 4)."""
-        camera = self._frames()[-1]
-        seat = camera @ np.linalg.inv(self.mount.chain[-1].transform)
-        return np.asarray(np.linalg.inv(self.base()) @ seat)
-
-    def seat_size(self) -> tuple[float, float]:
-        """Width and depth of the seat: the camera's underside, 40 by 30 mm at most."""
-        width, _, depth = self.mount.camera.camera.body.size_mm
-        return min(float(width), 40.0), min(float(depth), 30.0)
+        middle = self.fit.footing.middle_mm * Y - self.fit.seat_mm * Z
+        return np.asarray(self._frames()[4] @ shift(middle))
 
     def member(self) -> Member:
         """The post."""
@@ -77,37 +65,16 @@ class Posted:
         size = (self.profile.width_mm, self.profile.height_mm)
         return Member(self.post_id, self.profile.id, "post", axis, foot[:3, 0], size)
 
-    def wedge(self, screw: str) -> Wedge:
-        """The wedge; its base holes lie over the post's two slots."""
-        slot = self.profile.height_mm / 4.0
-        hole = SCREW_HOLES_MM.get(self.profile.bolt or "", 5.5)
-        # In the base's frame x runs across the post, y along it.
-        holes = tuple(
-            Hole(f"{self.mount.name} {k}", x, y, hole, "through", self.profile.bolt or "")
-            for k, (x, y) in enumerate(
-                ((sx * slot, sy * HOLE_SPREAD_MM) for sx in (-1, 1) for sy in (-1, 1)), 1
-            )
-        )
-        return Wedge(
-            self.wedge_id, self.mount.name, self.base(), self.seat(), self.seat_size(),
-            (self.profile.height_mm, BASE_LENGTH_MM), holes, screw, CAMERA_HOLE_MM,
-        )  # fmt: skip
+    def wedge(self) -> Wedge:
+        """The wedge in its place."""
+        return replace(self.fit.wedge, rig_from_base=self.base())
 
     def solids(self) -> tuple[Solid, ...]:
-        """Post and wedge; the wedge is the hull of base and seat."""
+        """Post and wedge, the wedge as it is printed."""
         post = self.member()
-        base = self.base()
-        flat = np.array([self.profile.height_mm, BASE_LENGTH_MM, 0.0])
-        seat = np.array([*self.seat_size(), 0.0])
-        corners = np.concatenate(
-            [
-                carried(base, box_corners(flat, np.zeros(3))),
-                carried(base @ self.seat(), box_corners(seat, np.zeros(3))),
-            ]
-        )
         return (
             bar(post.id, "member", post.axis_mm[0], post.axis_mm[1], post.across, post.size_mm),
-            Solid(self.wedge_id, "wedge", corners),
+            Solid(self.wedge_id, "wedge", carried(self.base(), self.fit.body_mm)),
         )
 
     def touching(self) -> tuple[tuple[str, str], ...]:
@@ -115,12 +82,37 @@ class Posted:
         return ((self.post_id, self.wedge_id), (self.wedge_id, self.mount.name))
 
 
-def seat_height(camera: RigCamera, pose: Pose, base: Floats) -> float:
-    """How high the seat must be for the camera to clear the post's side."""
-    body = camera.camera.body
-    corners = box_corners(body.size_mm, body.centre_camera_mm) - body.mount_thread_camera_mm
-    height = corners @ pose.rotation_rig_to_camera @ base[:, 2]
-    return max(LEAST_SEAT_MM, UNDER_MM - float(height.min()))
+def post_for(camera: RigCamera, fit: Fit, face: Floats, profile: Profile) -> Posted | None:
+    """A camera's post on the plate's frame ``face`` (4, 4); None where none is long enough."""
+    values = dict(zip(ANGLES, (float(a) for a in fit.angles_deg), strict=True))
+    values |= {"across": 0.0, "up": 0.0, "turn": fit.turned_deg, "post": 300.0}
+    back = fit.footing.front_mm
+    found = reach(_chain(camera, fit, face, back, profile), values, ["across", "up", "post"],
+                  fit.pose, with_rotation=False)  # fmt: skip
+    length = float(np.ceil(found["post"] - 1e-9))
+    back += length - found["post"]
+    found["post"] = length
+    if not back + fit.footing.rear_mm <= length <= LONGEST_POST_MM:
+        return None
+    chain = _chain(camera, fit, face, back, profile)
+    placed = camera.moved_to(chain_pose(chain, found))
+    return Posted(CameraMount(placed, camera.pose, post_settings(found), chain), fit, back, profile)
+
+
+def _chain(
+    camera: RigCamera, fit: Fit, face: Floats, back_mm: float, profile: Profile
+) -> tuple[Link, ...]:
+    """From the plate to the camera. ``back_mm``: the post's end to the camera's thread."""
+    side = np.array([profile.width_mm / 2.0, 0.0, -back_mm])
+    # The wedge's base: x across the post, y along it, z out of its side.
+    base, thread = frame(side, Y, Z, X), camera.camera.body.mount_thread_camera_mm
+    return (
+        Link(face, Motion.SLIDE, X, "across"),
+        Link(np.eye(4), Motion.SLIDE, Y, "up"),
+        Link(np.eye(4), Motion.TURN, Z, "turn"),
+        Link(np.eye(4), Motion.SLIDE, Z, "post"),
+        *head_links(base, fit.seat_mm, fit.seat_mm, thread),
+    )
 
 
 def post_settings(values: dict[str, float]) -> tuple[Setting, ...]:
