@@ -1,8 +1,9 @@
 """JSON schemas and key tables of the files, generated from the models that read them.
 
 ``python -m rig.schemas DOCS`` writes the schemas of rig files, design files, station files,
-sessions, captures and catalogues to the folder DOCS and renews the tables between the marks in
-``rig-file.md``, ``design-file.md``, ``station-file.md`` and ``catalogue.md``.
+sessions, captures, catalogues, mounts and plans to the folder DOCS and renews the tables between
+the marks in ``rig-file.md``, ``design-file.md``, ``station-file.md``, ``catalogue.md`` and
+``mounts.md``.
 """
 
 from __future__ import annotations
@@ -20,6 +21,8 @@ from pydantic.fields import FieldInfo
 
 from rig.catalogue.model import CatalogueFile
 from rig.designmodel import DesignFile
+from rig.mounts.planmodel import PlanFile
+from rig.mounts.systemfile import SystemFile
 from rig.rigfile import RigFile
 from rig.session.records import CaptureRecord, SessionFile
 from rig.station.stationfile import StationFile
@@ -102,6 +105,7 @@ def documents(docs: Path) -> dict[Path, str]:
     """What each generated file in the folder ``docs`` should hold."""
     rig_file, design_file = docs / "rig-file.md", docs / "design-file.md"
     station_file, parts_file = docs / "station-file.md", docs / "catalogue.md"
+    mounts = docs / "mounts.md"
     return {
         docs / "rig.schema.json": schema_text(RigFile, "Rigwright rig file"),
         docs / "design.schema.json": schema_text(DesignFile, "Rigwright design file"),
@@ -109,10 +113,13 @@ def documents(docs: Path) -> dict[Path, str]:
         docs / "session.schema.json": schema_text(SessionFile, "Rigwright session"),
         docs / "capture.schema.json": schema_text(CaptureRecord, "Rigwright capture"),
         docs / "catalogue.schema.json": schema_text(CatalogueFile, "Rigwright catalogue file"),
+        docs / "mount.schema.json": schema_text(SystemFile, "Rigwright mount file"),
+        docs / "plan.schema.json": schema_text(PlanFile, "Rigwright mount plan"),
         station_file: with_key_table(station_file.read_text(encoding="utf-8"), StationFile),
         rig_file: with_key_table(rig_file.read_text(encoding="utf-8"), RigFile),
         design_file: with_key_table(design_file.read_text(encoding="utf-8"), DesignFile),
         parts_file: with_key_table(parts_file.read_text(encoding="utf-8"), CatalogueFile),
+        mounts: with_key_table(mounts.read_text(encoding="utf-8"), SystemFile),
     }
 
 

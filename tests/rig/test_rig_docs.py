@@ -8,11 +8,13 @@ from pathlib import Path
 
 import jsonschema
 import pytest
+from plans import plate_plan
 
 from rig.catalogue.model import CatalogueFile
 from rig.designfile import design_document
 from rig.designmodel import DesignFile
 from rig.examples import example_rig, example_text
+from rig.mounts.planfile import plan_document
 from rig.rigfile import RigFile, parse_rig
 from rig.schemas import documents, keys, main
 from rig.station.stationfile import StationFile, parse_station
@@ -25,7 +27,8 @@ def test_generated_documents_are_up_to_date(repo: Path) -> None:
 
 
 def test_the_command_writes_them(repo: Path, tmp_path: Path) -> None:
-    for name in ("rig-file.md", "design-file.md", "station-file.md", "catalogue.md"):
+    pages = ("rig-file.md", "design-file.md", "station-file.md", "catalogue.md", "mounts.md")
+    for name in pages:
         text = (repo / "docs" / name).read_text(encoding="utf-8")
         (tmp_path / name).write_text(text.replace("| `seed` |", "| `sead` |"), encoding="utf-8")
     main(tmp_path)
@@ -59,6 +62,21 @@ def test_examples_follow_the_rig_schema(repo: Path) -> None:
         jsonschema.validate(data, schema)
     with pytest.raises(jsonschema.ValidationError, match="base_hieght"):
         jsonschema.validate({**data, "limits": {"base_hieght": {}}}, schema)
+
+
+def test_mounts_and_plans_follow_their_schemas(repo: Path) -> None:
+    schema = json.loads((repo / "docs/mount.schema.json").read_text())
+    jsonschema.Draft202012Validator.check_schema(schema)
+    for path in sorted((repo / "examples/mounts").glob("*.toml")):
+        jsonschema.validate(tomllib.loads(path.read_text()), schema)
+    with pytest.raises(jsonschema.ValidationError, match="t-slut"):
+        jsonschema.validate({"kind": "t-slut"}, schema)
+    schema = json.loads((repo / "docs/plan.schema.json").read_text())
+    jsonschema.Draft202012Validator.check_schema(schema)
+    document = json.loads(json.dumps(plan_document(plate_plan()), allow_nan=False))
+    jsonschema.validate(document, schema)
+    with pytest.raises(jsonschema.ValidationError, match="mounts"):
+        jsonschema.validate({k: v for k, v in document.items() if k != "mounts"}, schema)
 
 
 def test_what_is_written_follows_the_design_schema(repo: Path, design: Design) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -19,9 +20,9 @@ from rig.catalogue.items import Profile
 from rig.convex import box_corners, cylinder_corners
 from rig.mounts.kinematics import PLATE_FROM_CAMERA, head_angles, rotated, turned_over
 from rig.mounts.settings import turn
-from rig.mounts.solids import carried
+from rig.mounts.solids import camera_solids, carried
 from rig.mounts.structure import Hole, Wedge
-from rig.mounts.systems.footing import Footing, footing_behind
+from rig.mounts.systems.footing import Footing, clear_footing
 
 _, Y, Z = np.eye(3)
 LEAST_SEAT_MM = 12.0
@@ -88,8 +89,13 @@ class Fitter:
             raise self._too_steep(camera, refused)
 
     def _tries(self, camera: RigCamera) -> Iterator[Fit | InputError]:
-        """Every turn of the post: the wedge, or why it cannot be printed."""
-        for more in TURNS_DEG:
+        """Every turn of the post: the wedge, or why it cannot be printed.
+
+        Screws behind the camera come first: its lens leaves more room there, and the post is
+        shorter. Where the camera looks up from its post, the plane of the seat cuts off what is
+        behind, and only screws ahead of it hold.
+        """
+        for more, ahead in product(TURNS_DEG, (False, True)):
             for pose in (camera.pose, turned_over(camera.pose)):
                 up = -pose.rotation_rig_to_camera[1] @ self.axes[:, :2]
                 if float(np.hypot(*up)) < LEVEL:
@@ -100,11 +106,13 @@ class Fitter:
                 if -pose.rotation_rig_to_camera[1] @ base[:, 2] < STEEPEST:
                     continue
                 try:
-                    yield self._fit(camera, pose, turned, base)
+                    yield self._fit(camera, pose, turned, base, ahead)
                 except InputError as error:
                     yield error
 
-    def _fit(self, camera: RigCamera, pose: Pose, turned_deg: float, base: Floats) -> Fit:
+    def _fit(
+        self, camera: RigCamera, pose: Pose, turned_deg: float, base: Floats, ahead: bool
+    ) -> Fit:
         """The wedge on a post turned so far; ``base`` (3, 3) are the axes of its side."""
         profile, seat = self.profile, seat_height(camera, pose, base)
         axes = base.T @ pose.rotation_rig_to_camera.T @ PLATE_FROM_CAMERA.T
@@ -112,7 +120,9 @@ class Fitter:
             room_for(CAMERA_SCREW, self.catalogue), room_for(profile.bolt or "M5", self.catalogue)
         )  # fmt: skip
         blocks = _over_base(camera, rotated(axes, seat * Z))
-        footing = footing_behind(blocks, seat, axes[:, 2], rooms, profile.height_mm / 4.0)
+        footing = clear_footing(
+            blocks, seat, axes[:, 2], rooms, profile.height_mm / 4.0, ahead=ahead
+        )
         stands = rotated(axes, seat * Z - footing.middle_mm * Y)
         wedge = _wedge(camera, rotated(base), stands, footing, profile)
         part = print_part(wedge, self.catalogue)
@@ -190,8 +200,9 @@ def seat_size(camera: RigCamera) -> tuple[float, float]:
 
 
 def seat_height(camera: RigCamera, pose: Pose, base: Floats) -> float:
-    """How high the seat must be for the camera to clear the post's side."""
-    body = camera.camera.body
-    corners = box_corners(body.size_mm, body.centre_camera_mm) - body.mount_thread_camera_mm
-    height = corners @ pose.rotation_rig_to_camera @ base[:, 2]
+    """How high the seat must be for body, lens and plug to clear the post's side."""
+    placed = camera.moved_to(pose)
+    mouth = pose.to_rig(camera.camera.body.mount_thread_camera_mm[None])[0]
+    corners = np.concatenate([solid.corners_mm for solid in camera_solids(placed)])
+    height = (corners - mouth) @ base[:, 2]
     return max(LEAST_SEAT_MM, UNDER_MM - float(height.min()))

@@ -1,4 +1,4 @@
-"""Where the base of a printed wedge is screwed down: behind the camera, in reach of a key.
+"""Where the base of a printed wedge is screwed down: clear of the camera, in reach of a key.
 
 A camera is screwed onto its wedge from below, so the wedge goes onto its post with the camera on
 it. Its base screws are then turned from above, by a key along the base's normal: no part of
@@ -17,8 +17,8 @@ from rig.brackets.fastenings import Room
 from rig.brackets.recipe import CLEARANCE_MM
 from rig.brackets.shape import FLANGE_MM
 
-FRONT_MM = 30.0
-"""Base in front of the camera's thread: no seat reaches further, however it leans."""
+SEAT_REACH_MM = 30.0
+"""Base at the end without screws: no seat reaches further, however it leans."""
 
 PITCH_MM = 25.0
 """From the first row of screws to the second."""
@@ -56,20 +56,30 @@ class Footing:
         return (self.front_mm - self.rear_mm) / 2.0
 
 
-def footing_behind(
-    blocks: list[Floats], seat_mm: float, normal: Floats, screws: tuple[Room, Room], slot_mm: float
+def clear_footing(
+    blocks: list[Floats],
+    seat_mm: float,
+    normal: Floats,
+    screws: tuple[Room, Room],
+    slot_mm: float,
+    *,
+    ahead: bool,
 ) -> Footing:
     """The shortest base whose screws are free of ``blocks``, convex solids (N, 3) over it.
 
     ``seat_mm``: height of the seat; ``normal`` (3,): where it faces; ``screws``: the camera's and
-    the base's. All in the base's axes, from the point under the camera's thread.
+    the base's. All in the base's axes, from the point under the camera's thread. The screws lie
+    behind the camera, or ``ahead`` of it.
     """
     camera, base = (ROOF * (room.head_diameter_mm + CLEARANCE_MM) / 2.0 for room in screws)
     solids = [block[:, :2] for block in blocks] + [_screw_way(seat_mm, normal, camera)]
-    behind = [_rearmost(solid, sign * slot_mm, base) for solid in solids for sign in (-1.0, 1.0)]
-    first = float(np.floor(min(0.0, *behind) - base))
-    second = first - PITCH_MM
-    return Footing(FRONT_MM, EDGE_MM - second, (first, second), slot_mm)
+    way = np.array([1.0, -1.0 if ahead else 1.0])
+    ends = [_rearmost(solid * way, sign * slot_mm, base) for solid in solids for sign in (-1, 1)]
+    first = float(np.ceil(base - min(0.0, *ends)))
+    second = first + PITCH_MM
+    if ahead:
+        return Footing(second + EDGE_MM, SEAT_REACH_MM, (first, second), slot_mm)
+    return Footing(SEAT_REACH_MM, second + EDGE_MM, (-first, -second), slot_mm)
 
 
 def _screw_way(seat_mm: float, normal: Floats, radius_mm: float) -> Floats:

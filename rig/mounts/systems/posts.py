@@ -17,6 +17,8 @@ from rig.mounts.systems.fits import Fit
 
 X, Y, Z = np.eye(3)
 LONGEST_POST_MM = 1500.0
+FREE_MM = 5.0
+"""Plate to the end of a base on its post."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +94,7 @@ def post_for(camera: RigCamera, fit: Fit, face: Floats, profile: Profile) -> Pos
     length = float(np.ceil(found["post"] - 1e-9))
     back += length - found["post"]
     found["post"] = length
-    if not back + fit.footing.rear_mm <= length <= LONGEST_POST_MM:
+    if not back + fit.footing.rear_mm + FREE_MM <= length <= LONGEST_POST_MM:
         return None
     chain = _chain(camera, fit, face, back, profile)
     placed = camera.moved_to(chain_pose(chain, found))

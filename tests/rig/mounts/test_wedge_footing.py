@@ -130,6 +130,9 @@ def test_wedges_that_lean_to_any_side_are_printed(seed: int) -> None:
     assert mesh.is_watertight and mesh.body_count == 1
     assert overhang_deg(mesh) <= LIMIT_DEG
     check_keys(made)
+    placed = (made.mounts[0].camera,)
+    clashes = find_clashes(made.structure.solids, made.joined, placed, around())
+    assert not [c for c in clashes if c.kind == "solid" and c.one != "head entry"]
     solid = next(s for s in made.structure.solids if s.owner == wedge.id)
     printed = carried(part.rig_from_print, part.corners_mm)
     order = [np.lexsort(points.round(6).T) for points in (solid.corners_mm, printed)]
