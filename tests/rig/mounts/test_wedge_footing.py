@@ -145,6 +145,7 @@ def test_a_camera_that_looks_too_far_aside_is_told_how_far_to_turn_it() -> None:
     assert "\n" not in str(raised.value)
 
 
+@pytest.mark.slow
 def test_a_name_that_does_not_fit_is_what_is_told() -> None:
     camera = leaning(0, 10.0)
     named = RigCamera("M" * 120, camera.camera, camera.pose, 700.0)

@@ -19,7 +19,12 @@ def projected(table_rays: np.ndarray, camera_matrix: np.ndarray, distortion: np.
 
 
 @pytest.mark.parametrize(
-    ("width_px", "distortion"), [(600, NONE), (600, (-0.12, 0.05, 0.0, 0.0, 0.0)), (2000, STRONG)]
+    ("width_px", "distortion"),
+    [
+        (600, NONE),
+        (600, (-0.12, 0.05, 0.0, 0.0, 0.0)),
+        pytest.param(2000, STRONG, marks=pytest.mark.slow),
+    ],
 )
 def test_every_pixels_ray_projects_back_to_it(width_px: int, distortion: tuple[float, ...]) -> None:
     middle = (0.507 * width_px, 0.371 * width_px)
