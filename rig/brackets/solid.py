@@ -48,6 +48,7 @@ def _printed(wedge: Wedge, shape: Shape, catalogue: Catalogue) -> PrintPart:
     cuts, bearings = screw_cuts(wedge, shape, catalogue)
     solid = _carved(shape.corners_mm, cuts)
     _check_bearings(wedge.id, bearings, solid)
+    _check_overhang(wedge.id, solid)
     rig_from_print = wedge.rig_from_base @ np.linalg.inv(shape.print_from_base)
     for place in engravings(wedge.camera, shape.corners_mm):
         name = engraved(place)
@@ -73,10 +74,7 @@ def bracket_mesh(part: PrintPart) -> trimesh.Trimesh:
 
     :class:`InternalError` when it is not closed or would need support.
     """
-    import trimesh
-
-    raw = _carved(part.corners_mm, part.cuts).to_mesh64()
-    mesh = trimesh.Trimesh(raw.vert_properties[:, :3], raw.tri_verts, process=False)
+    mesh = _mesh(_carved(part.corners_mm, part.cuts))
     if not (mesh.is_watertight and mesh.volume > 0.0):
         raise InternalError(
             "wedge-mesh", f"the mesh of wedge {part.name} is not closed", "report the plan"
@@ -121,6 +119,23 @@ def _check_bearings(wedge_id: str, bearings: tuple[Bearing, ...], solid: Manifol
                 f"{ring.what} of wedge {wedge_id} has nothing to press on",
                 "move the hole, or make base or seat larger",
             )
+
+
+def _check_overhang(wedge_id: str, solid: Manifold) -> None:
+    """A screw head's seat leans with the wedge, and may face the bed where the outside does not."""
+    if overhang_deg(_mesh(solid)) > LARGEST_OVERHANG_DEG:
+        raise InputError(
+            "wedge-shape",
+            f"wedge {wedge_id} cannot be printed without support: its seat leans too far",
+            "turn the camera, or its post",
+        )
+
+
+def _mesh(solid: Manifold) -> trimesh.Trimesh:
+    import trimesh
+
+    raw = solid.to_mesh64()
+    return trimesh.Trimesh(raw.vert_properties[:, :3], raw.tri_verts, process=False)
 
 
 def overhang_deg(mesh: trimesh.Trimesh, up: Floats | None = None) -> float:

@@ -29,7 +29,7 @@ from rig.brackets.fastenings import room_for
 from rig.brackets.lettering import words
 from rig.catalogue import load_catalogue
 from rig.mounts.settings import turn
-from rig.mounts.structure import Wedge
+from rig.mounts.structure import Hole, Wedge
 
 CATALOGUE = load_catalogue()
 HERE = np.eye(4)
@@ -117,6 +117,27 @@ def test_a_name_too_long_is_refused_in_one_line() -> None:
 def test_letters_that_the_typeface_lacks_become_question_marks() -> None:
     assert words("相").width == words("?").width
     assert words("ü").width == words("u").width
+
+
+def test_a_steep_seat_is_printed_so_that_its_screw_needs_no_support() -> None:
+    """The lightest way up has the outside right, and the camera screw's shoulder facing the bed."""
+    lean, roll = np.radians(63.55), np.radians(-24.25)
+    seat = np.eye(4)
+    seat[:3, :3] = turn(np.array([1.0, 0.0, 0.0]), float(np.degrees(lean))) @ turn(
+        np.array([0.0, 0.0, 1.0]), float(np.degrees(-roll))
+    )
+    seat[:3, 3] = [0.0, -53.0, 40.3]
+    holes = tuple(
+        Hole(f"{k}", x, y, 5.5, "through", "M5")
+        for k, (x, y) in enumerate([(-10.0, 49.0), (-10.0, 74.0), (10.0, 49.0), (10.0, 74.0)], 1)
+    )
+    wedge = Wedge(
+        "steep", "cam06", np.eye(4), seat, (40.0, 30.0), (40.0, 166.0), holes, "stud-1-4-20", 6.8
+    )
+    part = print_part(wedge, load_catalogue())
+    mesh = bracket_mesh(part)
+    assert mesh.is_watertight
+    assert overhang_deg(mesh) <= 60.0
 
 
 def test_screws_need_something_to_press_on() -> None:
