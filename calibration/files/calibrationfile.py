@@ -13,9 +13,9 @@ from annotated_types import Len
 from calibration.adjustment.camera import CalibratedCamera, Interior
 from calibration.adjustment.noise import NoiseModel
 from calibration.adjustment.result import Calibration, CalibrationQuality, Place
+from calibration.edge.strict import StrictModel, model_of, parsed, plain, record_of
+from calibration.edge.writing import read_limited, write_whole
 from calibration.files.packing import PackedCovariance, compact, packed, unpacked
-from calibration.files.strict import StrictModel, model_of, parsed, plain, record_of
-from calibration.files.writing import read_limited, write_whole
 from calibration.observations import Carrier, Distance, TargetSet
 from geometry.arrays import Floats
 from geometry.errors import InputError

@@ -10,7 +10,7 @@ import numpy as np
 
 from calibration.adjustment.camera import PER_CAMERA
 from calibration.adjustment.covariance import Covariance
-from calibration.files.strict import StrictModel
+from calibration.edge.strict import StrictModel
 from geometry.arrays import Floats
 from geometry.errors import InputError
 

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import difflib
 import math
-import os
-import secrets
 import tomllib
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 
+from calibration.edge.strict import one_line
+from calibration.edge.writing import write_whole
 from calibration.observations import Distance
 from calibration.targets.filekeys import (
     MarkersModel,
@@ -19,7 +18,6 @@ from calibration.targets.filekeys import (
     PlateModel,
     RingsModel,
     RulerModel,
-    StrictModel,
     TargetsModel,
 )
 from calibration.targets.kinds import (
@@ -34,7 +32,7 @@ from calibration.targets.kinds import (
     marker_numbers,
 )
 from calibration.targets.ringcodes import RingCodeFamily
-from geometry.errors import ConflictError, InputError
+from geometry.errors import InputError
 
 SCHEMA = "rigwright.targets/1"
 LARGEST_BYTES = 5_000_000
@@ -63,7 +61,7 @@ def targets_from(text: str, source: str = "the target file") -> TargetPlan:
         problem = f"{source} is not TOML ({str(error)[:120]})"
         raise InputError("targets-toml", problem, "correct that line") from error
     except ValidationError as error:
-        raise _one_line(error, source) from error
+        raise one_line(error, TargetsModel, source) from error
     return targets_of(model)
 
 
@@ -107,19 +105,7 @@ def targets_text(plan: TargetPlan) -> str:
 
 def write_targets(plan: TargetPlan, path: Path, overwrite: bool = False) -> None:
     """Write a target file, whole or not at all."""
-    if path.exists() and not overwrite:
-        raise ConflictError(
-            "file-exists", f"{path.name} exists already", "give another name, or allow overwriting"
-        )
-    part = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
-    try:
-        part.write_text(targets_text(plan), "utf-8")
-        os.replace(part, path)  # noqa: PTH105 - one system call, and the name says what it does
-    except OSError as error:
-        part.unlink(missing_ok=True)
-        raise InputError(
-            "file-write", f"{path.name} cannot be written ({error.strerror})", "give another folder"
-        ) from error
+    write_whole(path, targets_text(plan).encode(), overwrite)
 
 
 def _check_markers(carrier: CarrierKind) -> None:
@@ -205,7 +191,7 @@ def _rings(m: RingsModel) -> RingCarrier:
     return RingCarrier(**rest, places=_places(m.targets), ruler=_ruler(m.ruler), family=family)
 
 
-def _model(carrier: CarrierKind) -> tuple[str, StrictModel]:
+def _model(carrier: CarrierKind) -> tuple[str, BaseModel]:
     values = vars(carrier).copy()
     ruler = values.pop("ruler")
     values["ruler"] = None if ruler is None else vars(ruler)
@@ -227,21 +213,3 @@ def _place(place: Place) -> dict[str, Any]:
         "position_mm": place.position_mm,
         "sigma_mm": place.sigma_mm,
     }
-
-
-def _one_line(error: ValidationError, source: str) -> InputError:
-    """The most telling finding; a misspelt key first, since it makes another seem missing."""
-    found = sorted(error.errors(), key=lambda e: e["type"] != "extra_forbidden")
-    first = found[0]
-    more = f" ({len(found) - 1} more after it)" if len(found) > 1 else ""
-    where = ".".join(str(part) for part in first["loc"]) or "the file"
-    if first["type"] == "extra_forbidden":
-        known = {k for m in StrictModel.__subclasses__() for k in m.model_fields}
-        close = difflib.get_close_matches(str(first["loc"][-1]), sorted(known), 1, 0.5)
-        remedy = f"did you mean {close[0]}?" if close else "remove it"
-        return InputError("key-unknown", f"{source}: {where} is not known{more}", remedy)
-    if first["type"] == "missing":
-        return InputError("key-missing", f"{source}: {where} is missing{more}", "add it")
-    remedy = first["msg"][:1].lower() + first["msg"][1:].replace("Input should", "it should")
-    remedy = remedy.replace("input should", "it should")
-    return InputError("value", f"{source}: {where} cannot be used{more}", remedy)

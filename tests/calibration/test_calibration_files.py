@@ -12,6 +12,7 @@ import pytest
 
 from calibration.acceptance import Acceptance, LengthLimit, MeasuredLength, Outcome, Volume
 from calibration.check import check
+from calibration.edge.strict import plain
 from calibration.files import (
     ACCEPTANCES,
     CHECKS,
@@ -24,7 +25,6 @@ from calibration.files import (
     write_calibration,
 )
 from calibration.files.packing import compact
-from calibration.files.strict import plain
 from geometry.errors import ConflictError, InputError
 
 

@@ -90,10 +90,10 @@ def parsed(model: type[ModelT], text: str | bytes, source: str) -> ModelT:
     try:
         return model.model_validate_json(text)
     except ValidationError as error:
-        raise _one_line(error, model, source) from error
+        raise one_line(error, model, source) from error
 
 
-def _one_line(error: ValidationError, model: type[BaseModel], source: str) -> InputError:
+def one_line(error: ValidationError, model: type[BaseModel], source: str) -> InputError:
     """The most telling finding: another kind of file, then a misspelt key, then the rest."""
     # A misspelt key makes another seem missing, and another kind of file misspells them all.
     found = sorted(
@@ -104,7 +104,7 @@ def _one_line(error: ValidationError, model: type[BaseModel], source: str) -> In
     if first["type"] == "json_invalid":
         return InputError("file-json", f"{source} is not JSON", "give the file as it was written")
     if first["type"] == "extra_forbidden":
-        close = difflib.get_close_matches(str(first["loc"][-1]), list(model.model_fields), 1, 0.5)
+        close = difflib.get_close_matches(str(first["loc"][-1]), _keys_of(model), 1, 0.5)
         remedy = f"did you mean {close[0]}?" if close else "remove it"
         return InputError("key-unknown", f"{source}: {where} is not known{more}", remedy)
     if first["type"] == "missing":
@@ -112,3 +112,17 @@ def _one_line(error: ValidationError, model: type[BaseModel], source: str) -> In
     message = first["msg"].removeprefix("Value error, ")
     remedy = message[:1].lower() + message[1:].replace("Input should", "it should")
     return InputError("value", f"{source}: {where} cannot be used{more}", remedy)
+
+
+def _keys_of(model: type[BaseModel]) -> list[str]:
+    """All keys that a file may have, however deep."""
+    found: dict[str, None] = {}
+    waiting: list[Any] = [model]
+    while waiting:
+        kind = waiting.pop()
+        if isinstance(kind, type) and issubclass(kind, BaseModel):
+            found.update({info.alias or name: None for name, info in kind.model_fields.items()})
+            waiting += [info.annotation for info in kind.model_fields.values()]
+        else:
+            waiting += get_args(kind)
+    return list(found)

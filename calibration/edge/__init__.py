@@ -1,0 +1,1 @@
+"""Where files come and go: read strictly with one-line errors, written whole or not at all."""
