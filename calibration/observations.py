@@ -94,9 +94,15 @@ class TargetSet:
     def __post_init__(self) -> None:
         ids = [i for carrier in self.carriers for i in carrier.ids]
         _require(
-            len(ids) > 0 and len(set(ids)) == len(ids),
+            len(ids) > 0,
             "targets-ids",
-            f"target set {self.name!r} is empty, or two of its targets have one id",
+            f"target set {self.name!r} has no targets",
+            "add a plate, markers or ring targets",
+        )
+        _require(
+            len(set(ids)) == len(ids),
+            "targets-ids",
+            f"two targets of target set {self.name!r} have one id",
             "give each target its own id",
         )
         unknown = [d for d in self.distances if not {d.first, d.second} <= set(ids)]

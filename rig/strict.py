@@ -58,7 +58,8 @@ def _spell(location: tuple[int | str, ...]) -> str:
     return text.removeprefix(".") or "the file"
 
 
-def _unknown_key(model: type[BaseModel], location: tuple[int | str, ...]) -> str:
+def unknown_key(model: type[BaseModel], location: tuple[int | str, ...]) -> str:
+    """A remedy for a key at ``location`` that a model does not have: the nearest that it has."""
     owner: type[BaseModel] | None = model
     for part in location[:-1]:
         if isinstance(part, str) and owner is not None:
@@ -83,7 +84,7 @@ def one_line(error: ValidationError, model: type[BaseModel], source: str) -> Inp
     where, message = _spell(first["loc"]), first["msg"].removeprefix("Value error, ")
     more = f" ({others} more to mend after it)" if others else ""
     if first["type"] == "extra_forbidden":
-        remedy = _unknown_key(model, first["loc"])
+        remedy = unknown_key(model, first["loc"])
         return InputError("key-unknown", f"{source}: {where} is not known{more}", remedy)
     if first["type"] == "missing":
         return InputError("key-missing", f"{source}: {where} is missing{more}", "add it")

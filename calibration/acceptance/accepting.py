@@ -97,7 +97,19 @@ def _camera_index(calibration: Calibration, observations: Observations) -> Ints:
             f"camera {strange[0]!r} is not in the calibration",
             f"use the cameras {', '.join(known)}",
         )
-    return np.array([known[name] for name in observations.cameras], dtype=np.int64)
+    index = np.array([known[name] for name in observations.cameras], dtype=np.int64)
+    for name, k, size in zip(
+        observations.cameras, index, observations.image_size_px.tolist(), strict=True
+    ):
+        calibrated = calibration.cameras[k].image_size_px
+        if tuple(size) != calibrated:
+            raise InputError(
+                "acceptance-image-size",
+                f"camera {name!r} has images of {size[0]} x {size[1]} px, in the calibration "
+                f"{calibrated[0]} x {calibrated[1]}",
+                "use the same image size and crop as for the calibration",
+            )
+    return index
 
 
 def _lines(observations: Observations, points: Points) -> tuple[_Line, ...]:

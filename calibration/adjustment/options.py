@@ -112,6 +112,14 @@ class CalibrationOptions:
     reject: bool = True
     cross_validate: bool = True
 
+    def __post_init__(self) -> None:
+        if self.reference_poses is not None and not self.start:
+            raise InputError(
+                "calibration-reference-poses",
+                "nothing gives the poses that are said to be known",
+                "give the design, or leave out how well its poses are known",
+            )
+
     def model_of(self, camera: str) -> InteriorModel:
         """The model of one camera."""
         return self.models.get(camera, self.model)

@@ -14,6 +14,7 @@ from calibration.adjustment.camera import (
 )
 from calibration.adjustment.components import Component
 from calibration.adjustment.covariance import Covariance
+from calibration.adjustment.datum import reach_mm
 from calibration.adjustment.levenberg import Solution
 from calibration.adjustment.network import Network
 from calibration.adjustment.reliability import Reliability
@@ -33,6 +34,7 @@ CROSS_VALIDATION_LIMIT = 2.0
 COORDINATES_LIMIT = 1.5
 COVERAGE_LIMIT = 0.3
 OUTLIERS_LIMIT = 0.03
+USUAL_REACH_MM = (150.0, 10_000.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,6 +122,12 @@ def warnings(
 ) -> tuple[str, ...]:
     """One sentence for each thing a user should know, the most important first."""
     out = []
+    reach = reach_mm(judged.solution.state, judged.network)
+    if not USUAL_REACH_MM[0] <= reach <= USUAL_REACH_MM[1]:
+        out.append(
+            f"The cameras come out {reach:.3g} mm from the targets: where that is not so, the "
+            "sizes in the target set are not in millimetres."
+        )
     if cross is not None and cross.ratio > CROSS_VALIDATION_LIMIT:
         out.append(
             f"Two halves of the images differ {cross.ratio:.1f} times as much as predicted: "

@@ -38,7 +38,12 @@ def either(cameras: tuple[str, ...]) -> str:
 
 
 def lens(camera: str, px: float, mm: float, focal_share: float) -> str:
-    """A lens changed."""
+    """A lens changed; its focal length has turned negative where the whole image is turned."""
+    if focal_share < -1.0:
+        return (
+            f"The images of camera {camera} are turned by 180 degrees against the reference: its "
+            f"image points are off by {pixels(px)}. Turn them back, or calibrate anew."
+        )
     return (
         f"The lens of camera {camera} has changed (focal length by {focal_share:+.2%}): its image "
         f"points are off by {pixels(px)}, which shifts points at the subject by {length(mm)}."

@@ -22,7 +22,7 @@ from calibration.targets.kinds import (
 
 _ENOUGH_MARKERS = 4
 _MOST_COLUMNS = 30
-_FEW = 8
+FEW = 8
 """Some codes look the same in a mirror: a few targets can be found in a mirrored picture."""
 
 
@@ -41,7 +41,7 @@ def diagnose(
         if isinstance(plate, CharucoPlate)
         and (finding := plate_layout(sights[plate.inverted], plate)) is not None
     ]
-    if findings or found > _FEW:
+    if findings or found > FEW:
         return tuple(findings)
     questions = (_mirrored,) if found else (_mirrored, _inverted, _other_dictionary)
     for question in questions:

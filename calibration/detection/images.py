@@ -72,17 +72,18 @@ def picture_from(image: AnyImage, name: str = "the picture", order: str = "BGR")
     return Picture(levels, np.rint(levels * gain).astype(np.uint8), gain)
 
 
-def read_picture(path: Path) -> Picture:
-    """The picture in a file. Raises a one-line :class:`InputError` naming the file."""
+def read_picture(path: Path, name: str | None = None) -> Picture:
+    """The picture in a file. Raises a one-line :class:`InputError` with its ``name``."""
+    name = path.name if name is None else name
     try:
         if path.stat().st_size > LARGEST_BYTES:
-            raise InputError("image-size", f"{path.name} is larger than a picture", _TAKEN)
+            raise InputError("image-size", f"{name} is larger than a picture", _TAKEN)
         data = path.read_bytes()
     except OSError as error:
         raise InputError(
-            "image-read", f"{path.name} cannot be read ({error.strerror})", "check the path"
+            "image-read", f"{name} cannot be read ({error.strerror})", "check the path"
         ) from error
-    return decoded(data, path.name)
+    return decoded(data, name)
 
 
 def decoded(data: bytes, name: str) -> Picture:

@@ -10,9 +10,11 @@ from pathlib import Path
 
 import numpy as np
 
-from calibration.detection.finding import as_picture, find_targets
+from calibration.detection.diagnosis import FEW
+from calibration.detection.finding import find_targets
 from calibration.detection.found import Detections
 from calibration.detection.gates import Gates
+from calibration.detection.images import read_picture
 from calibration.detection.opencv import AnyImage
 from calibration.detection.selftest import require_opencv
 from calibration.observations import Observations
@@ -36,7 +38,8 @@ class TakenPicture:
     def name(self) -> str:
         """What to call it in a message."""
         if isinstance(self.image, Path):
-            return self.image.name
+            # Pictures of one frame have one name: only the folder tells them apart.
+            return f"{self.image.parent.name}/{self.image.name}"
         return f"the picture of {self.camera} in frame {self.frame}"
 
 
@@ -74,7 +77,8 @@ class DetectionJob:
             except InputError as error:
                 problem = error.problem.replace("the picture", self.picture.name, 1)
                 raise InputError(error.detail, problem, error.remedy) from error
-        return find_targets(as_picture(image), self.plan, self.gates, self.explain)
+        picture = read_picture(image, self.picture.name)
+        return find_targets(picture, self.plan, self.gates, self.explain)
 
 
 def detect_pictures(
@@ -172,7 +176,9 @@ def _check_seen(jobs: Sequence[DetectionJob], found: Sequence[Detections]) -> No
     cameras = dict.fromkeys(job.picture.camera for job in jobs)
     for camera in cameras:
         mine = [k for k, job in enumerate(jobs) if job.picture.camera == camera]
-        if any(len(found[k]) for k in mine):
+        best = max(mine, key=lambda k: len(found[k]))
+        if len(found[best]):
+            _check_mirrored(jobs[best], len(found[best]))
             continue
         # A picture with rejections shows more than one without, and explains better.
         for k in sorted(mine, key=lambda k: -len(found[k].rejections))[:_EXPLAINED]:
@@ -191,6 +197,15 @@ def _check_seen(jobs: Sequence[DetectionJob], found: Sequence[Detections]) -> No
             "check that the targets are in view, sharp and well lit, and that the target file "
             "is theirs",
         )
+
+
+def _check_mirrored(job: DetectionJob, found: int) -> None:
+    """Few targets in a camera's best picture may be those that look the same in a mirror."""
+    if found > min(FEW, len(job.plan.target_set().ids) // 2):
+        return
+    for finding in replace(job, explain=True)().findings:
+        if finding.code == "mirrored":
+            raise finding.error(f"camera {job.picture.camera}")
 
 
 def _observations(

@@ -31,7 +31,7 @@ from geometry.errors import InputError
 if TYPE_CHECKING:
     from reportlab.pdfgen.canvas import Canvas
 
-PAGES_MM = {"A4": (210.0, 297.0), "A3": (297.0, 420.0)}
+PAGES_MM = {"A4": (210.0, 297.0), "A3": (297.0, 420.0), "LETTER": (215.9, 279.4)}
 MARGIN_MM = 8.0
 _RULER_MM, _FOOT_MM, _TEXT_MM = 100.0, 22.0, 3.0
 _POINTS_PER_MM = 72.0 / 25.4
@@ -41,7 +41,7 @@ Separate = MarkerCarrier | RingCarrier
 
 
 def page_size(page: str) -> tuple[float, float]:
-    """Width and height in millimetres of ``A4``, ``A3``, or ``600x400``; ``A4 landscape`` too."""
+    """Width and height in millimetres of ``A4``, ``A3``, ``letter`` or ``600x400``, and turned."""
     name, _, turned = page.strip().partition(" ")
     size = PAGES_MM.get(name.upper())
     if size is None:
@@ -55,7 +55,7 @@ def page_size(page: str) -> tuple[float, float]:
         raise InputError(
             "page",
             f"there is no page {page!r}",
-            "give A4, A3, 'A4 landscape', or width x height in millimetres such as 600x400",
+            "give A4, A3, letter, 'A4 landscape', or width x height in millimetres such as 600x400",
         )
     return (size[1], size[0]) if turned else size
 

@@ -123,6 +123,18 @@ class _Job:
         return Price(designed, figures(self.evaluate(naive)), figures(self.evaluate(built)))
 
 
+def _must_stand(cameras: tuple[RigCamera, ...], around: Surroundings) -> None:
+    """Raises :class:`InputError` where the floor is over a camera."""
+    lowest = min(cameras, key=lambda c: float(c.pose.position_rig_mm[2]))
+    height = float(lowest.pose.position_rig_mm[2])
+    if around.floor_z_mm >= height:
+        raise InputError(
+            "mount-floor",
+            f"the floor at {around.floor_z_mm:g} mm is over {lowest.name} at {height:.0f} mm",
+            f"give a floor_z_mm well below {height:.0f}, or leave it out",
+        )
+
+
 def make_plan(
     cameras: tuple[RigCamera, ...],
     subject: Subject,
@@ -147,6 +159,7 @@ def make_plan(
         raise InputError("no-cameras", "no camera needs a mount", "plan a design that places some")
     standing = tuple(camera for camera in cameras if camera.fixed)
     around = spec.surroundings(subject, limits, standing)
+    _must_stand(free, around)
     naive = tuple(nearest(mount) for mount in spec.system.hold(free, around).mounts)
     roomy, spare = job.relaxed(spec)
     job.tell("arrange", 0.2)

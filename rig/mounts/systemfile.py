@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from geometry.errors import InputError, TooLargeError
+from geometry.errors import InputError, NotFoundError, TooLargeError
 from rig.catalogue import Catalogue, load_catalogue
 from rig.mounts.making import SystemSpec
 from rig.mounts.surroundings import Zone
@@ -139,7 +139,12 @@ def system_from_mapping(
     data: Mapping[str, object], name: str = "mount", catalogue: Catalogue | None = None
 ) -> SystemSpec:
     """A mount system from parsed TOML or JSON; ``name`` stands in front of every error."""
-    return validated(SystemFile, data, name).to_spec(catalogue or load_catalogue())
+    file = validated(SystemFile, data, name)
+    try:
+        return file.to_spec(catalogue or load_catalogue())
+    except NotFoundError as error:
+        # It is not what was asked for that is missing, but what the file names.
+        raise InputError(error.detail, f"{name}: {error.problem}", error.remedy) from error
 
 
 def parse_system(text: str, name: str = "mount", catalogue: Catalogue | None = None) -> SystemSpec:

@@ -1,6 +1,6 @@
 """What to buy, cut and print for a mount plan: bill of materials, cut list, joints."""
 
-from rig.parts.bill import Bill, BillLine, Prices, bill_of_materials
+from rig.parts.bill import Bill, BillLine, Prices, bill_of_materials, must_be_known
 from rig.parts.cuts import Cut, cut_list
 from rig.parts.tables import bill_csv, bill_json, cuts_csv, cuts_json, joints_csv, joints_json
 
@@ -17,4 +17,5 @@ __all__ = [
     "cuts_json",
     "joints_csv",
     "joints_json",
+    "must_be_known",
 ]

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from geometry.arrays import Floats
-from geometry.errors import InputError
+from geometry.camera import RigCamera
+from geometry.errors import InputError, NotFoundError
 from rig.catalogue.catalogue import Catalogue
 from rig.mounts.plan import MountPlan
 from rig.mounts.structure import Plate
@@ -119,6 +120,20 @@ def bill_of_materials(
         *_wedges(plan, wedge_volumes_mm3 or {}, priced),
     ]
     return Bill(tuple(lines), priced.currency)
+
+
+def must_be_known(prices: Prices, cameras: Sequence[RigCamera], catalogue: Catalogue) -> None:
+    """Raises :class:`InputError` for a price of nothing that a plan for ``cameras`` could have.
+
+    Asked before a plan is made, which takes its time.
+    """
+    own = {camera.camera.name for camera in cameras} | {"plate"}
+    own |= {f"{camera.name} wedge" for camera in cameras}
+    for part in set(prices.each) - own:
+        try:
+            catalogue.find(part)
+        except NotFoundError as error:
+            raise InputError(error.detail, f"prices: {error.problem}", error.remedy) from error
 
 
 def _resolved(prices: Prices, plan: MountPlan, catalogue: Catalogue) -> Prices:

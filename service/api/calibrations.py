@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Response
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from service.api.context import ServiceDep
 from service.api.job_routes import JobResource
@@ -55,6 +55,15 @@ class CalibrationRequest(Model):
     cross_validate: Annotated[
         bool, Field(description="Calibrate two halves as well, and compare.")
     ] = True
+
+    @model_validator(mode="after")
+    def _together(self) -> CalibrationRequest:
+        both = sorted(set(self.hold) & set(self.free))
+        if both:
+            raise ValueError(f"{both[0]} is among hold and among free")
+        if self.poses_known_to is not None and self.design_id is None:
+            raise ValueError("poses_known_to is about the poses of a design: give design_id")
+        return self
 
 
 class LateView(Model):

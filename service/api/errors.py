@@ -7,11 +7,13 @@ import errno
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
+from pydantic import BaseModel
 from sqlalchemy.exc import OperationalError
 from starlette.exceptions import HTTPException
 from starlette.routing import Match
 
 from geometry.errors import InputError, InternalError, RigwrightError
+from rig.strict import unknown_key
 from service.logs import log
 from service.problems import HTTP_ERRORS, MEDIA_TYPE, problem_document
 from service.wire import error_from_fields
@@ -51,10 +53,11 @@ def _rigwright_error(_request: Request, error: Exception) -> JSONResponse:
     return answer(error)
 
 
-def _invalid_request(_request: Request, error: Exception) -> JSONResponse:
+def _invalid_request(request: Request, error: Exception) -> JSONResponse:
     if not isinstance(error, RequestValidationError):
         raise error
-    found = error.errors()
+    # A misspelt key often makes another seem missing: it comes first.
+    found = sorted(error.errors(), key=lambda fault: fault["type"] != "extra_forbidden")
     faults = [
         {"location": ".".join(str(part) for part in fault["loc"]), "message": fault["msg"]}
         for fault in found
@@ -65,11 +68,21 @@ def _invalid_request(_request: Request, error: Exception) -> JSONResponse:
             errors=faults,
         )
     more = f" ({len(faults) - 1} more)" if len(faults) > 1 else ""
-    problem = f"{faults[0]['location']}: {faults[0]['message']}{more}"
-    return answer(
-        InputError("request-invalid", problem, "compare the request with GET /openapi.json"),
-        errors=faults,
-    )
+    message = faults[0]["message"].removeprefix("Value error, ")
+    remedy = "compare the request with GET /openapi.json"
+    if found[0]["type"] == "extra_forbidden":
+        message, remedy = "this key is not known", _nearest_key(request, found[0]["loc"]) or remedy
+    problem = f"{faults[0]['location']}: {message}{more}"
+    return answer(InputError("request-invalid", problem, remedy), errors=faults)
+
+
+def _nearest_key(request: Request, location: tuple[int | str, ...]) -> str:
+    """What was meant by a key of the body; empty where its model cannot be told."""
+    body = getattr(request.scope.get("route"), "body_field", None)
+    model = None if body is None else body.field_info.annotation
+    if location[0] != "body" or not isinstance(model, type) or not issubclass(model, BaseModel):
+        return ""
+    return unknown_key(model, location[1:])
 
 
 def _http_error(request: Request, error: Exception) -> JSONResponse:

@@ -57,7 +57,7 @@ def _design(
     entry: str, request: JSON, inputs: dict[str, Path], out: Path, *, as_json: bool, force: bool
 ) -> None:
     with one_line_errors():
-        with new_folder(out, force=force) as folder:
+        with new_folder(out, force=force, spare=inputs.values()) as folder:
             result = run_task(entry, request, inputs, folder)
         files = {path.name: path for path in sorted(out.iterdir())}
         _show(result, files, as_json=as_json)

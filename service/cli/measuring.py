@@ -78,7 +78,7 @@ def run_calibrate_command(
         inputs |= {"targets": targets}
         if options.design is not None:
             inputs["design"] = options.design
-        with new_folder(out, force=force) as folder:
+        with new_folder(out, force=force, spare=_given(pictures, inputs)) as folder:
             result = run_task(f"{_TASKS}:calibration", request, inputs, folder)
             shutil.copyfile(targets, folder / TARGETS)
         _show("calibration", result, out, as_json=as_json)
@@ -97,7 +97,6 @@ def run_check_command(
     with one_line_errors():
         request, inputs = _asked(pictures, captures, options.workers)
         request |= {
-            "reference": options.reference.name,
             "tolerance_mm": options.tolerance_mm,
             "hidden_limit_mm": options.hidden_limit_mm,
         }
@@ -106,7 +105,7 @@ def run_check_command(
             "targets": options.targets or _targets_beside(options.reference),
             **_earlier(options.history),
         }
-        with new_folder(out, force=force) as folder:
+        with new_folder(out, force=force, spare=_given(pictures, inputs)) as folder:
             result = run_task(f"{_TASKS}:rig_check", request, inputs, folder)
         if options.history is not None:
             _add_to_history(out, options.history, request["made_utc"])
@@ -128,7 +127,6 @@ def run_accept_command(
     with one_line_errors():
         request, inputs = _asked(pictures, captures, options.workers)
         request |= {
-            "reference": options.reference.name,
             "limit": options.limit,
             "volume": options.volume,
             "rig": options.rig,
@@ -136,7 +134,7 @@ def run_accept_command(
             "temperature_degc": options.temperature_degc,
         }
         inputs |= {"calibration": _reference(options.reference), "targets": options.targets}
-        with new_folder(out, force=force) as folder:
+        with new_folder(out, force=force, spare=_given(pictures, inputs)) as folder:
             result = run_task(f"{_TASKS}:acceptance", request, inputs, folder)
         _show("acceptance", result, out, as_json=as_json)
     if result["outcome"] != "passed":
@@ -163,6 +161,10 @@ def _asked(
     return request, {"pictures": pictures}
 
 
+def _given(pictures: Path, inputs: dict[str, Path]) -> list[Path]:
+    return [pictures, *inputs.values()]
+
+
 def _reference(given: Path) -> Path:
     return given / "calibration.json" if given.is_dir() else given
 
@@ -177,8 +179,10 @@ def _targets_beside(reference: Path) -> Path:
 
 
 def _earlier(history: Path | None) -> dict[str, Path]:
-    if history is None or not history.is_dir():
+    if history is None or not history.exists():
         return {}
+    if not history.is_dir():
+        raise InputError("history-folder", f"{history} is a file", "give a folder as --history")
     found = sorted(history.glob("check-*.json"))
     return {f"check-{number}": path for number, path in enumerate(found)}
 
@@ -186,10 +190,18 @@ def _earlier(history: Path | None) -> dict[str, Path]:
 def _add_to_history(out: Path, history: Path, made_utc: str) -> None:
     history.mkdir(parents=True, exist_ok=True)
     stamp = "".join(letter for letter in made_utc if letter.isdigit())[:14]
-    shutil.copyfile(out / "check.json", history / f"check-{stamp}.json")
+    shutil.copyfile(out / "check.json", _free(history, f"check-{stamp}"))
     page = out / "history.html"
     if page.exists():
         shutil.copyfile(page, history / page.name)
+
+
+def _free(folder: Path, stem: str) -> Path:
+    """A name for one more file: checks of one second must not replace one another."""
+    path, number = folder / f"{stem}.json", 2
+    while path.exists():
+        path, number = folder / f"{stem}-{number}.json", number + 1
+    return path
 
 
 def _show(what: str, result: JSON, out: Path, *, as_json: bool) -> None:

@@ -44,7 +44,7 @@ def run_plan_command(
         if options.paper not in PAPERS:
             raise InputError("paper", f"there is no paper {options.paper!r}", "give A4 or A3")
         inputs = {"design": design, "mount": mount, "scan": scan or _scan_beside(design)}
-        with new_folder(out, force=force) as folder:
+        with new_folder(out, force=force, spare=inputs.values()) as folder:
             result = run_task("service.tasks.planning:plan", asdict(options), inputs, folder)
         _show(result, out, as_json=as_json)
     if not result["buildable"]:

@@ -9,7 +9,7 @@ import signal
 import sys
 import tempfile
 import threading
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
@@ -98,10 +98,11 @@ def cancel_on_signal() -> Iterator[threading.Event]:
 
 
 @contextmanager
-def new_folder(out: Path, *, force: bool) -> Iterator[Path]:
+def new_folder(out: Path, *, force: bool, spare: Iterable[Path] = ()) -> Iterator[Path]:
     """An empty folder that becomes ``out`` when all went well, and disappears when not.
 
-    Raises :class:`ConflictError` when ``out`` holds something and ``force`` is not given.
+    Raises :class:`ConflictError` when ``out`` holds something and ``force`` is not given, or
+    one of the files and folders to ``spare``, which would be lost.
     """
     if out.exists() and not out.is_dir():
         raise InputError("out-not-a-folder", f"{out} is a file", "give another --out")
@@ -111,6 +112,13 @@ def new_folder(out: Path, *, force: bool) -> Iterator[Path]:
             f"the folder {out} is not empty",
             "give another --out, or --force to replace it",
         )
+    for path in spare:
+        if path.exists() and path.resolve().is_relative_to(out.resolve()):
+            raise ConflictError(
+                "out-holds-input",
+                f"the folder {out} holds {path}, which would be lost",
+                "give another --out",
+            )
     made = _missing_parents(out)
     try:
         out.parent.mkdir(parents=True, exist_ok=True)

@@ -31,7 +31,9 @@ def run_targets_command(
                 "give a target set to print, or a design to propose one for",
                 "for example: rigwright targets --design rig/design.json --out targets",
             )
-        with new_folder(out, force=force) as folder:
+        # A set that was printed before is printed anew, with its ruler measured: it is kept.
+        spare = [path for path in inputs.values() if path != out / "targets.toml"]
+        with new_folder(out, force=force, spare=spare) as folder:
             result = run_task("service.tasks.targeting:targets", {"page": page}, inputs, folder)
         _show(result, out, as_json=as_json)
 

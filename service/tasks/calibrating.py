@@ -26,6 +26,7 @@ from calibration.files import (
 )
 from calibration.report import calibration_page, check_page, history_of, history_page
 from calibration.targets.files import read_targets
+from geometry.errors import InputError
 from rig.designfile import read_design
 from service.measuring.figures import acceptance_figures, calibration_figures, check_figures
 from service.measuring.seeing import DETECTING, see, seen_figures
@@ -56,8 +57,15 @@ def _options(request: Request, inputs: Inputs) -> CalibrationOptions:
     if "design" in inputs:
         start = tuple(map(CalibratedCamera.from_rig, read_design(inputs["design"]).cameras))
     sigmas = request.get("poses_known_to")
-    model = dict.fromkeys(request.get("hold") or (), FIXED)
-    model |= dict.fromkeys(request.get("free") or (), FREE)
+    hold, free = request.get("hold") or (), request.get("free") or ()
+    both = sorted(set(hold) & set(free))
+    if both:
+        raise InputError(
+            "calibration-model",
+            f"the lens parameter {both[0]} shall be held and free",
+            "name it in one of the two",
+        )
+    model = dict.fromkeys(hold, FIXED) | dict.fromkeys(free, FREE)
     return CalibrationOptions(
         start=start,
         model=InteriorModel(**model),
@@ -73,16 +81,18 @@ def rig_check(
 
     With earlier checks (inputs ``check-0``, ``check-1``...) there is a ``history.html`` as well.
     """
-    reference = read_calibration(inputs["calibration"]).calibration
+    told = read_calibration(inputs["calibration"])
+    reference, name = told.calibration, _name(request, inputs, told)
     seen = see(read_targets(inputs["targets"]), request, inputs, folder, report, cancel)
-    limits = {k: request[k] for k in ("hidden_limit_mm", "tolerance_mm") if request.get(k)}
+    given = {k: request.get(k) for k in ("hidden_limit_mm", "tolerance_mm")}
+    limits = {key: value for key, value in given.items() if value is not None}
     result = check(reference, seen.observations, CheckOptions(**limits), _after(report), cancel)
-    record = CheckRecord(request["reference"], request["made_utc"], result)
+    record = CheckRecord(name, request["made_utc"], result)
     CHECKS.write(folder / "check.json", record)
     _write(folder / "report.html", check_page(record, reference))
     earlier = [CHECKS.read(path) for role, path in inputs.items() if role.startswith("check-")]
     if earlier:
-        history = history_of([*earlier, record], request["reference"])
+        history = history_of([*earlier, record], name)
         _write(folder / "history.html", history_page(history))
     report(Progress("done", 1.0))
     return {"detection": seen_figures(seen), **check_figures(result)}
@@ -92,23 +102,32 @@ def acceptance(
     request: Request, inputs: Inputs, folder: Path, report: ProgressCallback, cancel: CancelToken
 ) -> JSON:
     """Measure a calibrated bar along several lines; writes ``certificate.pdf``."""
-    reference = read_calibration(inputs["calibration"]).calibration
-    seen = see(read_targets(inputs["targets"]), request, inputs, folder, report, cancel)
+    told = read_calibration(inputs["calibration"])
+    reference, name = told.calibration, _name(request, inputs, told)
     limit, volume = LengthLimit(*request["limit"]), Volume(*request["volume"])
+    seen = see(read_targets(inputs["targets"]), request, inputs, folder, report, cancel)
     done = accept(reference, seen.observations, limit, volume, _after(report), cancel)
     heading = Heading(
         rig=request["rig"],
-        calibration=request["reference"],
+        calibration=name,
         artefact=seen.observations.targets.name,
         operator=request["operator"],
         made_utc=request["made_utc"],
         temperature_degc=request["temperature_degc"],
     )
     (folder / "certificate.pdf").write_bytes(certificate_pdf(done, heading))
-    record = AcceptanceRecord(request["reference"], request["made_utc"], done)
+    record = AcceptanceRecord(name, request["made_utc"], done)
     ACCEPTANCES.write(folder / "acceptance.json", record)
     report(Progress("done", 1.0))
     return {"detection": seen_figures(seen), **acceptance_figures(done)}
+
+
+def _name(request: Request, inputs: Inputs, record: CalibrationRecord) -> str:
+    """What a reference is called: its id, or its name and time, which tell it from others."""
+    known = request.get("reference")
+    if known:
+        return str(known)
+    return f"{record.name or inputs['calibration'].parent.name}, {record.made_utc}"
 
 
 def _after(report: ProgressCallback) -> ProgressCallback:

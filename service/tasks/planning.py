@@ -14,7 +14,7 @@ from rig.designfile import read_design
 from rig.mounts.making import make_plan
 from rig.mounts.plan import MountPlan
 from rig.mounts.systemfile import read_system, system_from_mapping
-from rig.parts import Prices
+from rig.parts import Prices, must_be_known
 from rig.planfiles import PlanOptions
 from rig.planfolder import write_plan
 from service.wire import plain
@@ -46,6 +46,8 @@ def plan(
             f"{inputs['design'].name} does not say its limits",
             "give a design.json that `rigwright design` wrote",
         )
+    prices = Prices(system.currency, system.prices)
+    must_be_known(prices, read.cameras, catalogue)
     rig = read.file.rig.to_spec()
     scan = read_scan(inputs["scan"], rig.scan_options)
     subject = prepare_subject(scan, rig.subject_options).subject
@@ -61,7 +63,7 @@ def plan(
     )
     options = PlanOptions(
         catalogue=catalogue,
-        prices=Prices(system.currency, system.prices),
+        prices=prices,
         occluder=subject.occluder,
         paper=request["paper"],
         step=request["step"],

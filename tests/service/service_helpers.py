@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import importlib
+import json
 import os
 import signal
 import subprocess
@@ -10,12 +12,18 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import httpx2
+import pytest
+from typer.testing import CliRunner
 
+from service.cli import app, running
+from service.jobs.engine import Report, Task
 from service.store import Store
 from service.store.jobrecords import JobRecord
+from service.wire import plain
+from solver.progress import CancelToken, Progress
 
 T = TypeVar("T")
 HERE = Path(__file__).parent
@@ -64,6 +72,48 @@ def alive(mark: str) -> list[int]:
 def files_under(folder: Path) -> list[Path]:
     """Every file below ``folder``, which others may be changing."""
     return sorted(Path(where) / name for where, _, names in os.walk(folder) for name in names)
+
+
+def rigwright_here(*arguments: object, cwd: Path) -> subprocess.CompletedProcess[str]:
+    """The command, its task too, in this process: loading everything anew takes two seconds."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(cwd)
+        patch.setattr(running, "ProcessEngine", InThisProcess)
+        done = CliRunner().invoke(app, [str(argument) for argument in arguments])
+    if done.exception is not None and not isinstance(done.exception, SystemExit):
+        raise done.exception
+    return subprocess.CompletedProcess(list(arguments), done.exit_code, done.stdout, done.stderr)
+
+
+def one_line_and_nothing_left(folder: Path, *arguments: object, here: bool = False) -> str:
+    """What a command says that is refused: one line with a remedy, and no file more or less."""
+    before = files_under(folder)
+    run = rigwright_here if here else rigwright
+    done = run(*arguments, "--out", "out", cwd=folder)
+    assert done.returncode == 2, done.stderr
+    assert done.stdout == ""
+    told = [line for line in done.stderr.splitlines() if line.startswith("rigwright: ")]
+    assert len(told) == 1
+    assert done.stderr.splitlines()[-1] == told[0]
+    assert "; " in told[0]  # what to do about it
+    assert files_under(folder) == before
+    return told[0]
+
+
+class InThisProcess:
+    """An engine that begins no process: for many tasks that fail early. Faults are seen whole."""
+
+    def run(self, task: Task, report: Report, cancel: CancelToken) -> dict[str, Any]:
+        module, _, name = task.kind.entry.partition(":")
+        entry = getattr(importlib.import_module(module), name)
+
+        def told(progress: Progress, /) -> None:
+            report(plain(progress))
+
+        request = json.loads(json.dumps(task.request))
+        result = entry(request, task.inputs, task.folder, told, cancel)
+        whole: dict[str, Any] = json.loads(json.dumps(plain(result), allow_nan=False))
+        return whole
 
 
 @dataclass

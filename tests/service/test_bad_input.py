@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 import trimesh
 from scanfiles import plain_head
-from service_helpers import files_under, rigwright
+from service_helpers import files_under, one_line_and_nothing_left
 from starlette.testclient import TestClient
 
 from rig.examples import example_text
@@ -58,19 +58,6 @@ SCANS: dict[str, tuple[str, Callable[[Path], None]]] = {
     "a zip called glb": ("head.glb", zipped),
     "no face": ("head.stl", without_a_face),
 }
-
-
-def one_line_and_nothing_left(folder: Path, *arguments: str) -> str:
-    before = files_under(folder)
-    done = rigwright(*arguments, "--out", "out", cwd=folder)
-    assert done.returncode == 2, done.stderr
-    assert done.stdout == ""
-    told = [line for line in done.stderr.splitlines() if line.startswith("rigwright: ")]
-    assert len(told) == 1
-    assert done.stderr.splitlines()[-1] == told[0]
-    assert "; " in told[0]  # what to do about it
-    assert files_under(folder) == before
-    return told[0]
 
 
 def refused(client: TestClient, service: Service, path: Path, **options: str) -> dict[str, object]:

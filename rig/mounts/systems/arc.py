@@ -16,6 +16,7 @@ import numpy as np
 
 from geometry.arrays import Floats
 from geometry.camera import RigCamera
+from geometry.errors import InputError
 from rig.mounts.clashes import pairs
 from rig.mounts.settings import CameraMount, Tape
 from rig.mounts.solids import bar, camera_solids, lens_front
@@ -92,6 +93,19 @@ class ArcSystem:
     def hold(self, cameras: tuple[RigCamera, ...], around: Surroundings) -> ArcHolding:
         """See :class:`rig.mounts.systems.base.MountSystem`."""
         shape = self._shape(cameras, around)
+        try:
+            return self._held(cameras, around, shape)
+        except InputError as error:
+            if error.detail != "mount-reach" or self.radius_mm is None:
+                raise
+            own = replace(self, radius_mm=None)._shape(cameras, around).radius_mm
+            raise InputError(
+                "arc-radius",
+                f"{error.problem} of an arc with a radius of {self.radius_mm:g} mm",
+                f"give a radius_mm of about {own:.0f}, or leave it out",
+            ) from error
+
+    def _held(self, cameras: tuple[RigCamera, ...], around: Surroundings, shape: Rib) -> ArcHolding:
         ribs = _Ribs(self, shape)
         away = np.stack([c.pose.position_rig_mm for c in cameras]) - shape.centre_mm
         order = [int(k) for k in np.argsort(np.arctan2(away[:, 0], -away[:, 1]))]
@@ -110,7 +124,14 @@ class ArcSystem:
         count = int(np.ceil((high - low) / FACET_DEG))
         # The middle of a facet lies nearer to the centre than its corners.
         radius = needed / float(np.cos(np.radians((high - low) / count / 2.0)))
-        radius = self.radius_mm or float(np.ceil(radius / 10.0) * 10.0)
+        own = float(np.ceil(radius / 10.0) * 10.0)
+        if self.radius_mm is not None and self.radius_mm < needed - BEHIND_MM:
+            raise InputError(
+                "arc-radius",
+                f"an arc with a radius of {self.radius_mm:g} mm does not go round the cameras",
+                f"give a radius_mm of {own:.0f} or more, or leave it out",
+            )
+        radius = self.radius_mm or own
         profile = self.outrigger.profile
         return Rib("", profile, centre, 0.0, radius, low, high, count, self.step_mm)
 

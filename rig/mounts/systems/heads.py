@@ -164,7 +164,8 @@ def stances(
 def _out_of_reach(head: HeadKind, camera: RigCamera, stance: Stance[FootT]) -> InputError:
     pan, tilt, roll = stance.angles_deg
     reach = [
-        float(np.clip(a, low + head.step_deg, high - head.step_deg))
+        # An angle that cannot be set has no room for a step at either end.
+        float(np.clip(a, min(low + head.step_deg, high), max(high - head.step_deg, low)))
         for a, (low, high) in zip(stance.angles_deg, head.ranges_deg, strict=True)
     ]
     return InputError(
