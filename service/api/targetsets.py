@@ -24,7 +24,7 @@ KIND = "target-set"
 PATH = "/v1/target-sets"
 router = APIRouter(tags=["target sets"])
 Page = Annotated[
-    str, Query(max_length=40, description="A4, A3, 'A4 landscape', or 600x400 in millimetres.")
+    str, Query(max_length=40, description="A4, A3, letter, 'A4 landscape', or 600x400 in mm.")
 ]
 
 

@@ -83,7 +83,7 @@ GOOD = targets_text(TargetPlan("set", (marker_sheet("tags", "DICT_4X4_50", (0, 1
         (GOOD.replace("20.0", '"big"', 1), r"size_mm cannot be used"),
         (GOOD.replace("DICT_4X4_50", "DICT_9X9"), "no marker dictionary 'DICT_9X9'"),
         (GOOD.replace("targets/1", "targets/7"), "schema cannot be used"),
-        (GOOD.split("[[markers]]")[0], "is empty"),
+        (GOOD.split("[[markers]]")[0], "has no targets"),
         (GOOD + GOOD[GOOD.index("[[markers]]") :], "have one name"),
         (GOOD.replace("number = 1", "number = 99"), "shows marker 99, but DICT_4X4_50 has none"),
     ],
