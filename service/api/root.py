@@ -20,7 +20,14 @@ _LITTLE_DISK_BYTES = 1 << 30
 _RESOURCES = (
     *("health", "scans", "designs", "plans", "evaluations"),
     *("rigs", "captures", "rig-tests", "sessions"),
-    *("target-sets", "picture-sets", "calibrations", "checks", "acceptances"),
+    *(
+        "target-sets",
+        "target-set-proposals",
+        "picture-sets",
+        "calibrations",
+        "checks",
+        "acceptances",
+    ),
 )
 
 

@@ -120,7 +120,7 @@ def add_target_set(request: TargetsModel, response: Response, service: ServiceDe
 
 
 @router.post(
-    PATH + "/proposals",
+    "/v1/target-set-proposals",
     status_code=201,
     response_model=ProposedTargets,
     responses=problems(400, 404, 409, 413, 422, 507),
