@@ -49,7 +49,7 @@ def test_a_contract_fuzzer_finds_no_fault(start_server: StartServer, tmp_path: P
 def test_a_contract_fuzzer_finds_no_fault_in_long(
     start_server: StartServer, tmp_path: Path
 ) -> None:
-    fuzz(start_server().url, tmp_path, "--max-examples", "60")
+    fuzz(start_server().url, tmp_path, "--max-examples", "30")
 
 
 def test_the_committed_document_is_that_of_the_code() -> None:
