@@ -271,6 +271,7 @@ def test_dark_and_narrow(page: str, browser: Browser, tmp_path: Path) -> None:
 
 
 @pytest.mark.needs_browser
+@pytest.mark.slow
 def test_the_ellipsoid_figures_turn_together(page: str, browser: Browser, tmp_path: Path) -> None:
     path = tmp_path / "report.html"
     path.write_text(page, encoding="utf-8")

@@ -21,10 +21,12 @@ from service.cli.running import new_folder, one_line_errors, run_task
 
 
 def test_help_is_quick_and_loads_no_heavy_package() -> None:
-    rigwright("--help")  # compiles what was never compiled
-    began = time.monotonic()
-    done = rigwright("--help")
-    assert time.monotonic() - began < 0.5
+    took = []
+    for _ in range(5):  # other tests run beside this one: the quickest of several
+        began = time.monotonic()
+        done = rigwright("--help")
+        took.append(time.monotonic() - began)
+    assert min(took) < 0.5
     assert done.returncode == 0
     for command in ("design", "evaluate", "serve", "demo"):
         assert command in done.stdout
@@ -263,6 +265,7 @@ class TestServe:
         entries = [json.loads(line) for line in log.splitlines()]
         assert any(entry.get("path") == "/v1" and entry["request_id"] for entry in entries)
 
+    @pytest.mark.slow
     def test_a_second_one_on_the_same_data_is_refused(
         self, serve: Callable[..., subprocess.Popen[str]]
     ) -> None:

@@ -254,6 +254,7 @@ class TestOnTheCommandLine:
         command = [*RIGWRIGHT, *map(str, arguments)]
         return subprocess.run(command, capture_output=True, text=True, check=False, **more)
 
+    @pytest.mark.slow
     def test_a_design_like_that_of_the_service(
         self, tmp_path: Path, head: Path, rig_file: Path, http: TestClient, completed: JSON
     ) -> None:

@@ -125,6 +125,7 @@ def test_the_same_key_gets_the_same_job(client: TestClient) -> None:
     assert len(client.get("/v1/counts").json()["items"]) == 1
 
 
+@pytest.mark.slow
 def test_too_many_jobs_are_put_off(start_server: StartServer) -> None:
     with start_server(max_queued_jobs=1).client() as client:
         running = count(client, 10_000)
@@ -245,6 +246,7 @@ class TestDurability:
             events = follow(client, waiting)
             assert [event["event"] for event in events][:2] == ["pending", "running"]
 
+    @pytest.mark.slow
     def test_a_stop_marks_what_ran(self, start_server: StartServer, tmp_path: Path) -> None:
         server = start_server()
         with server.client() as client:
@@ -254,6 +256,7 @@ class TestDurability:
         with start_server(tmp_path / "data").client() as client:
             assert client.get(running).json()["status"] == "interrupted"
 
+    @pytest.mark.slow
     def test_a_second_service_on_the_same_data_is_refused(
         self, start_server: StartServer, tmp_path: Path
     ) -> None:

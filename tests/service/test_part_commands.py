@@ -34,7 +34,14 @@ def test_parts_of_ones_own_are_laid_over(tmp_path: Path) -> None:
     assert line.startswith("rigwright: ")
 
 
-@pytest.mark.parametrize("form", sorted(FORMATS))
+QUICK = ("colmap-text", "gltf")
+"""What a process is started for in every run; the writers themselves have tests of their own."""
+
+
+@pytest.mark.parametrize(
+    "form",
+    [pytest.param(f, marks=[] if f in QUICK else [pytest.mark.slow]) for f in sorted(FORMATS)],
+)
 def test_every_format_is_written(tmp_path: Path, form: str) -> None:
     done = rigwright("export", DESIGN, "--format", form, "--out", tmp_path / "out")
     assert done.returncode == 0, done.stderr

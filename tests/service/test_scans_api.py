@@ -220,6 +220,7 @@ class TestOnARealServer:
         assert "/problems/too-large/upload" in answer
         assert files_under(tmp_path / "data" / "tmp") == []
 
+    @pytest.mark.slow
     def test_a_broken_upload_leaves_nothing(
         self, start_server: StartServer, tmp_path: Path
     ) -> None:
@@ -242,6 +243,7 @@ class TestOnARealServer:
         with server.client() as client:
             assert client.get("/v1/scans").json()["items"] == []
 
+    @pytest.mark.slow
     def test_the_service_answers_while_scans_are_read(
         self, start_server: StartServer, head_file: Path
     ) -> None:

@@ -45,6 +45,7 @@ def wall_scene() -> Scene:
 
 
 @pytest.mark.parametrize("make", [face_scene, wall_scene])
+@pytest.mark.slow
 def test_ipopt_confirms_our_optimum(make: object) -> None:
     task, values = task_of(make())  # type: ignore[operator]
     ours = minimise(task, values, go_on, tolerance=1e-8, gain_tolerance=0.0)

@@ -108,6 +108,7 @@ def test_texts_can_be_read(sheets: tuple[Sheet, ...]) -> None:
         assert min(i.height_mm for i in sheet.items if isinstance(i, Text)) >= 1.6
 
 
+@pytest.mark.slow
 def test_equal_plans_give_equal_files_in_another_process() -> None:
     code = (
         "import hashlib, plans; from rig.drawings import *; s = view_sheets(plans.tslot_plan(2));"

@@ -27,6 +27,7 @@ def plan() -> MountPlan:
     return make_plan(cameras, subject, limits, parse_system('kind = "t-slot"'), trials=3)
 
 
+@pytest.mark.slow
 def test_every_setting_exists_and_gives_the_pose() -> None:
     for mount in plan().mounts:
         assert all(setting.exists for setting in mount.settings)

@@ -83,6 +83,7 @@ def thin_lens(camera: RigCamera, scene: SceneSettings, rays: int) -> np.ndarray:
     return np.asarray(total / rays)
 
 
+@pytest.mark.slow
 def test_layers_agree_with_a_thin_lens() -> None:
     camera = placed(
         lens(200, f_number=0.45), (0.0, -700.0, 0.0), target_mm=(0, 0, 0), focus_mm=700.0
