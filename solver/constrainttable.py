@@ -8,6 +8,7 @@ this table does not.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import lru_cache
 
 import numpy as np
 
@@ -149,6 +150,16 @@ def _means(scene: Scene) -> Iterator[ConstraintRow]:
             yield row(name, float(value), 0.0, Sense.EQUAL, "px", width, tolerance)
 
 
+@lru_cache(maxsize=4096)
+def _subjects(columns: bytes, width: int) -> tuple[tuple[int, ...], ...]:
+    """Cameras of each row, by the columns that it reads, (rows, width) int64.
+
+    Kept: thousands of evaluations of one rig ask for the same rows again and again.
+    """
+    cameras = np.frombuffer(columns, dtype=np.int64).reshape(-1, width) // PER_CAMERA
+    return tuple(tuple(dict.fromkeys(line)) for line in cameras.tolist())
+
+
 def _of_block(scene: Scene, candidates: Candidates) -> Iterator[ConstraintRow]:
     """Rows of places and bodies, the worst of each camera or pair."""
     block = candidates.block
@@ -156,11 +167,10 @@ def _of_block(scene: Scene, candidates: Candidates) -> Iterator[ConstraintRow]:
     value = block.value(state)
     slack = np.minimum(value - block.lower, block.upper - value)
     if isinstance(block, WeightedSum):
-        subjects: list[tuple[int, ...]] = [(-1,)] * block.rows
+        subjects: tuple[tuple[int, ...], ...] = ((-1,),) * block.rows
     else:
-        subjects = [
-            tuple(dict.fromkeys(int(c) // PER_CAMERA for c in line)) for line in block.columns
-        ]
+        columns = np.ascontiguousarray(block.columns, dtype=np.int64)
+        subjects = _subjects(columns.tobytes(), columns.shape[1])
     worst: dict[tuple[int, ...], int] = {}
     for k, subject in enumerate(subjects):
         if subject not in worst or slack[k] < slack[worst[subject]]:
