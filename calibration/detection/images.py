@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import io
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,7 +16,13 @@ from calibration.detection import opencv
 from calibration.detection.opencv import AnyImage, Bytes
 from geometry.errors import InputError
 
+if TYPE_CHECKING:
+    from PIL.Image import Image
+
 LARGEST_BYTES = 500_000_000
+LARGEST_PIXELS = 400_000_000
+"""Beyond any camera; a few kilobytes may claim more, and take all memory when they are decoded."""
+
 _TAKEN = "give grey or colour pictures of 8 or 16 bits as JPEG, PNG or TIFF"
 
 
@@ -88,6 +97,7 @@ def read_picture(path: Path, name: str | None = None) -> Picture:
 
 def decoded(data: bytes, name: str) -> Picture:
     """The picture in an encoded file. Raises a one-line :class:`InputError` naming it."""
+    _check_size(data, name)
     if data[:2] == b"\xff\xd8":
         _check_jpeg(data, name)
     image = opencv.decode(data) if data else None
@@ -96,18 +106,41 @@ def decoded(data: bytes, name: str) -> Picture:
     return picture_from(image, name)
 
 
-def _check_jpeg(data: bytes, name: str) -> None:
-    """OpenCV fills what is missing of a broken JPEG with grey and says nothing; Pillow tells."""
+@contextmanager
+def _opened(data: bytes) -> Iterator[Image]:
+    """The file's header as Pillow reads it; its own limit on size is not ours."""
+    from PIL import Image
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+        with Image.open(io.BytesIO(data)) as image:
+            yield image
+
+
+def _check_size(data: bytes, name: str) -> None:
     from PIL import Image
 
     try:
-        with warnings.catch_warnings(), Image.open(io.BytesIO(data)) as image:
-            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+        with _opened(data) as image:
+            pixels = image.width * image.height
+    except Image.DecompressionBombError:
+        pixels = LARGEST_PIXELS + 1
+    except (OSError, SyntaxError, ValueError):
+        return  # what Pillow cannot read OpenCV may, or says so itself
+    if pixels > LARGEST_PIXELS:
+        problem = f"{name} claims more than {LARGEST_PIXELS // 10**6} million pixels"
+        raise InputError("image-size", problem, _TAKEN)
+
+
+def _check_jpeg(data: bytes, name: str) -> None:
+    """OpenCV fills what is missing of a broken JPEG with grey and says nothing; Pillow tells."""
+    try:
+        with _opened(data) as image:
             if image.mode not in ("L", "RGB"):
                 raise InputError("image-channels", f"{name} is a {image.mode} JPEG", _TAKEN)
             image.draft("L", (image.width // 8, image.height // 8))
             image.load()
-    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
+    except (OSError, SyntaxError, ValueError) as error:
         raise InputError(
             "image-corrupt", f"{name} is a broken JPEG", "copy it from the camera again"
         ) from error

@@ -17,8 +17,11 @@ from geometry.arrays import Floats
 from geometry.errors import InputError
 
 PX_PER_MM = 12.0
-MOST_PIXELS = 100_000_000
+MOST_PIXELS = 20_000_000
+"""An A3 sheet. Half a gigabyte while it is drawn."""
+
 WHITE, BLACK = 0.86, 0.04
+FLAT_MM = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,18 +36,20 @@ class Face:
 def carrier_face(kind: CarrierKind, px_per_mm: float = PX_PER_MM) -> Face:
     """The face of a flat carrier whose targets have places, at its nominal size.
 
-    Raises a one-line :class:`InputError` for a carrier that is not flat or far too large.
+    A large one gets fewer pixels per millimetre. Raises a one-line :class:`InputError` for a
+    carrier that has no face, see :func:`has_face`.
     """
+    if not has_face(kind):
+        raise InputError(
+            "face-flat",
+            f"carrier {kind.name!r} is not flat, or its targets have no places",
+            "only sheets have a picture",
+        )
     patterns = _placed(kind)
     corners = np.array([_extent(pattern, place) for pattern, place in patterns])
     low, high = corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)
+    px_per_mm = min(px_per_mm, float(np.sqrt(MOST_PIXELS / np.prod(high - low))))
     width, height = (int(np.ceil(side * px_per_mm)) for side in high - low)
-    if width * height > MOST_PIXELS:
-        raise InputError(
-            "face-size",
-            f"carrier {kind.name!r} is too large for a picture ({width} x {height} pixels)",
-            "split it into several carriers",
-        )
     box = 1.0 / px_per_mm
     white = np.ones((height, width))
     for pattern, place in patterns:
@@ -54,17 +59,19 @@ def carrier_face(kind: CarrierKind, px_per_mm: float = PX_PER_MM) -> Face:
     return Face(png, width * box, height * box)
 
 
+def has_face(kind: CarrierKind) -> bool:
+    """Whether a carrier is flat and its targets have places."""
+    if isinstance(kind, CharucoPlate):
+        return True
+    places = np.array([p.position_mm for p in kind.places])
+    return bool(np.isfinite(places).all() and np.ptp(places[:, 2]) <= FLAT_MM)
+
+
 def _placed(kind: CarrierKind) -> list[tuple[Pattern, Floats]]:
     """Each pattern of a carrier with its place in the carrier's plane."""
     if isinstance(kind, CharucoPlate):
         return [(plate_pattern(kind), np.zeros(2))]
     places = np.array([p.position_mm for p in kind.places])
-    if not np.isfinite(places).all() or np.ptp(places[:, 2]) > 1e-6:
-        raise InputError(
-            "face-flat",
-            f"carrier {kind.name!r} is not flat, or its targets have no places",
-            "only sheets have a picture",
-        )
     if isinstance(kind, MarkerCarrier):
         made: list[Pattern] = [marker_pattern(kind, p.number) for p in kind.places]
     else:

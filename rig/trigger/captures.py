@@ -40,7 +40,6 @@ class Captures:
         self._flights: OrderedDict[str, Flight] = OrderedDict()
         self._current: Flight | None = None
         self._resolve_ns: int | None = None
-        self._given_up: set[str] = set()
         self.resolved = threading.Condition()
         """Notified when a flight has got its report."""
 
@@ -61,14 +60,20 @@ class Captures:
 
     # -- orders ------------------------------------------------------------------------------
 
-    def arm(self, program: Program) -> None:
-        """Set the outputs and arm."""
+    def arm(self, program: Program, abandoned: Callable[[], bool]) -> None:
+        """Set the outputs and arm.
+
+        ``abandoned``: whether who asked waits no more. The order may be under way still then, and
+        even succeed: nobody would fire or disarm it.
+        """
         self._require_free()
         self._keeper.check_boot()
         self._keeper.set_outputs(program)
         flight = Flight(program, self._keeper.view.boots)
         self._remember(flight)
-        flight.wanted = flight.id not in self._given_up
+        if abandoned():
+            # Only ever lowered: who gives up between the question and this line is not overruled.
+            flight.wanted = False
         try:
             made = self._keeper.talk.arm(program)
         except RefusedError as refused:
@@ -88,11 +93,7 @@ class Captures:
         flight.fit = self._keeper.fit()
 
     def give_up(self, capture_id: str) -> None:
-        """Who asked to arm it waits no more; from any thread.
-
-        The order may be under way still, and even succeed: then nobody would fire or disarm it.
-        """
-        self._given_up.add(capture_id)
+        """Who asked to arm it waits no more; from any thread."""
         flight = self._flights.get(capture_id)
         if flight is not None and not flight.fire_sent:
             flight.wanted = False
@@ -100,7 +101,6 @@ class Captures:
     def clear_up(self, capture_id: str) -> None:
         """Disarm what was armed for somebody who had given up."""
         flight = self._flights.get(capture_id)
-        self._given_up.discard(capture_id)
         if flight is not None and flight.open and self._stale(flight):
             self._resolve(flight)
 

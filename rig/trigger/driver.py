@@ -150,9 +150,12 @@ class SerialTriggerBox:
             raise _closed()
         program = compile_program(request, limits)
         self._armed_ns = {request.capture_id: time.monotonic_ns()}
+        abandoned = threading.Event()
         try:
-            self._order(lambda: self._captures.arm(program))
+            self._order(lambda: self._captures.arm(program, abandoned.is_set))
         except DeviceError:
+            # In this order: the flight that is not there yet will see the event.
+            abandoned.set()
             self._captures.give_up(request.capture_id)
             if self._queue is not None:
                 self._queue.put(lambda: self._captures.clear_up(request.capture_id))

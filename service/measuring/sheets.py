@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calibration.targets.drawing import Drawing
-from calibration.targets.faces import carrier_face
+from calibration.targets.faces import carrier_face, has_face
 from calibration.targets.kinds import (
     CarrierKind,
     CharucoPlate,
@@ -60,8 +60,10 @@ def _printed(carrier: CarrierKind, page: str) -> list[Sheet]:
         )
         for number, drawing in enumerate(drawings, 1)
     ]
-    whole = lambda: to_pdf(drawings, carrier.name)  # noqa: E731 - one of the makers above
-    return [Sheet(f"{stem}.pdf", carrier.name, "application/pdf", whole), *svgs]
+    pdf = Sheet(
+        f"{stem}.pdf", carrier.name, "application/pdf", lambda: to_pdf(drawings, carrier.name)
+    )
+    return [pdf, *svgs]
 
 
 def _drawn(carrier: CarrierKind, page: str) -> tuple[Drawing, ...]:
@@ -98,12 +100,10 @@ def _placed(carrier: CarrierKind) -> list[Sheet]:
 
 
 def _pictured(carrier: CarrierKind) -> list[Sheet]:
-    make = lambda: carrier_face(carrier).png  # noqa: E731 - as above
-    try:
-        carrier_face(carrier, px_per_mm=0.5)
-    except InputError:
+    if not has_face(carrier):
         return []
-    return [Sheet(f"{_stem(carrier)}.png", carrier.name, "image/png", make)]
+    name = f"{_stem(carrier)}.png"
+    return [Sheet(name, carrier.name, "image/png", lambda: carrier_face(carrier).png)]
 
 
 def _stem(carrier: CarrierKind) -> str:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from geometry.errors import InputError, NotFoundError
+from rig.cameras.base import FrameStatus
 from rig.session.recovery import read_books
 from rig.session.storage import Disk
 
@@ -56,7 +57,7 @@ def pictures_in_folder(folder: Path) -> tuple[Picture, ...]:
 
 
 def pictures_in_session(folder: Path, captures: Sequence[str] = ()) -> tuple[Picture, ...]:
-    """The pictures of a session's captures; all captures without a list.
+    """The whole pictures of a session's captures; all captures without a list.
 
     Raises :class:`NotFoundError` for a capture that is not there, and :class:`InputError` where
     there are no pictures.
@@ -73,7 +74,9 @@ def pictures_in_session(folder: Path, captures: Sequence[str] = ()) -> tuple[Pic
         Picture(frame.camera, f"{name}-{frame.shot}", folder / frame.file.path)
         for name in captures or sorted(records)
         for frame in records[name].frames
-        if not frame.raw and is_picture(PurePosixPath(frame.file.path).name)
+        if not frame.raw
+        and frame.status != FrameStatus.INCOMPLETE
+        and is_picture(PurePosixPath(frame.file.path).name)
     ]
     if not found:
         raise InputError(

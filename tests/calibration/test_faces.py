@@ -7,7 +7,7 @@ import pytest
 
 from calibration.detection import opencv
 from calibration.detection.finding import find_targets
-from calibration.targets.faces import carrier_face
+from calibration.targets.faces import MOST_PIXELS, carrier_face
 from calibration.targets.kinds import (
     CarrierKind,
     CharucoPlate,
@@ -55,5 +55,13 @@ def test_what_has_no_face_is_refused() -> None:
     far = (Place(1, (0.0, 0.0, 0.0), EXACT), Place(2, (0.0, 0.0, 50.0), EXACT))
     with pytest.raises(InputError, match="is not flat"):
         carrier_face(RingCarrier("stand", 3.0, far))
-    with pytest.raises(InputError, match="too large for a picture"):
-        carrier_face(CharucoPlate("wall", 40, 40, 50.0, 35.0, "DICT_6X6_1000"))
+
+
+def test_a_wall_gets_fewer_pixels_and_keeps_its_size() -> None:
+    wall = CharucoPlate("wall", 40, 30, 50.0, 35.0, "DICT_6X6_1000")
+    face = carrier_face(wall)
+    picture = opencv.decode(face.png)
+    assert picture is not None
+    assert picture.size <= MOST_PIXELS * 1.01
+    # Forty squares and a quarter on either side, to a pixel.
+    assert face.width_mm == pytest.approx(2025.0, abs=2025.0 / picture.shape[1])

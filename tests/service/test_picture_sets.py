@@ -14,6 +14,7 @@ from starlette.testclient import TestClient
 
 from geometry.errors import InputError, RigwrightError, TooLargeError
 from service.api.context import Service
+from service.pictures import archive
 from service.pictures.archive import archive_facts, unpack
 from service.pictures.listing import pictures_in_folder
 
@@ -101,22 +102,61 @@ def test_archives_that_are_refused(
     assert not any(files_under(folder / name) for name in ("blobs", "tmp", "work"))
 
 
+def broken(path: Path, method: int) -> None:
+    """An archive whose list is sound and whose picture is not."""
+    content = bytearray(packed("a/1.png", content=bytes(range(256)) * 40, method=method))
+    content[40:60] = bytes(20)
+    path.write_bytes(content)
+
+
+@pytest.mark.parametrize("method", [zipfile.ZIP_DEFLATED, zipfile.ZIP_LZMA, zipfile.ZIP_BZIP2])
+def test_a_picture_that_cannot_be_unpacked_is_one_line(tmp_path: Path, method: int) -> None:
+    broken(tmp_path / "p.zip", method)
+    assert archive_facts(tmp_path / "p.zip")["frames"] == 1
+    with pytest.raises(InputError, match=r"p\.zip is no sound ZIP archive"):
+        unpack(tmp_path / "p.zip", tmp_path)
+
+
+def test_a_way_of_packing_that_is_not_known_is_one_line(tmp_path: Path) -> None:
+    content = bytearray(packed("a/1.png"))
+    for header, at in ((b"PK\x03\x04", 8), (b"PK\x01\x02", 10)):
+        place = content.index(header) + at
+        content[place : place + 2] = (98).to_bytes(2, "little")  # PPMd
+    (tmp_path / "p.zip").write_bytes(content)
+    with pytest.raises(InputError, match=r"p\.zip is no sound ZIP archive"):
+        unpack(tmp_path / "p.zip", tmp_path)
+
+
+def test_what_would_fill_the_disk_is_not_unpacked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "p.zip").write_bytes(packed("a/1.png"))
+    monkeypatch.setattr(archive, "KEPT_FREE", 1 << 60)
+    with pytest.raises(TooLargeError, match="GB are free; make room"):
+        unpack(tmp_path / "p.zip", tmp_path)
+    assert not (tmp_path / "a").exists()
+
+
+NAMES = st.characters(exclude_characters="\x00", exclude_categories=["Cs"])
+"""zipfile itself cuts names off at a zero."""
+
+
 @settings(max_examples=30, deadline=None)
-@given(names=st.lists(st.text(max_size=30), max_size=4), cut=st.integers(0, 400))
+@given(names=st.lists(st.text(NAMES, max_size=30), max_size=4), cut=st.integers(0, 400))
 def test_no_archive_writes_outside_its_folder(
     tmp_path_factory: pytest.TempPathFactory, names: list[str], cut: int
 ) -> None:
     folder = tmp_path_factory.mktemp("unpack")
-    archive, out = folder / "p.zip", folder / "in" / "out"
+    path, out = folder / "p.zip", folder / "in" / "out"
     out.mkdir(parents=True)
     content = packed(*(name + ".png" for name in dict.fromkeys(names)))
-    archive.write_bytes(content[: max(len(content) - cut, 0)] if cut < 50 else content)
+    path.write_bytes(content[: max(len(content) - cut, 0)] if cut < 50 else content)
     try:
-        unpack(archive, out)
+        unpack(path, out)
     except RigwrightError as error:
         assert isinstance(error, InputError | TooLargeError)
         assert "\n" not in str(error)
-    outside = [p for p in files_under(folder) if p != archive and out not in p.parents]
+    outside = [p for p in files_under(folder) if p != path and out not in p.parents]
     assert outside == []
 
 
