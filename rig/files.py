@@ -5,15 +5,13 @@ from __future__ import annotations
 import csv
 import io
 import json
-import secrets
-import shutil
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from geometry.errors import ConflictError, InputError
 from geometry.preparation import PreparedSubject
 from rig.designfile import design_document
+from rig.folders import refuse_others, whole_folder
 from rig.layout import Layout
 from rig.layoutfile import layout_csv, layout_document
 from rig.report import render_report
@@ -116,46 +114,12 @@ def write_design_folder(
     """
     check_design_folder(out)
     makers = design_files(design, layout, prepared, spec, scan_name)
-    half = out.parent / f".{out.name}.{secrets.token_hex(4)}.part"
-    try:
-        half.mkdir(parents=True)
+    with whole_folder(out) as half:
         for name, make in makers.items():
             (half / name).write_bytes(make())
-        _put_in_place(half, out)
-    except OSError as error:
-        raise InputError(
-            "out-unwritable",
-            f"cannot write to {out} ({(error.strerror or 'unwritable').lower()})",
-            "choose another --out folder",
-        ) from error
-    finally:
-        shutil.rmtree(half, ignore_errors=True)
     return {name: out / name for name in makers}
 
 
 def check_design_folder(out: Path) -> None:
     """Raise when a design cannot be written to ``out``; call it before a long solve."""
-    if out.is_dir():
-        others = sorted(p.name for p in out.iterdir() if p.name not in FILE_NAMES)
-        if others:
-            raise ConflictError(
-                "out-not-empty",
-                f"the folder {out} holds other files ({others[0]})",
-                "choose an empty or new folder",
-            )
-    elif out.exists() or out.is_symlink():
-        raise ConflictError("out-not-a-folder", f"{out} is not a folder", "choose another place")
-
-
-def _put_in_place(half: Path, out: Path) -> None:
-    """Rename ``half`` to ``out``; a former design steps aside first and goes last."""
-    former = half.with_suffix(".old")
-    if out.exists():
-        out.rename(former)
-    try:
-        half.rename(out)
-    except OSError:
-        if former.exists():
-            former.rename(out)
-        raise
-    shutil.rmtree(former, ignore_errors=True)
+    refuse_others(out, FILE_NAMES)

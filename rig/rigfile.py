@@ -5,14 +5,12 @@ TOML in files, the same structure as JSON over HTTP. ``docs/rig-file.md`` lists 
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Literal, Self
 
 from pydantic import Field
 
-from geometry.errors import InputError, TooLargeError
 from rig.catalogue import Catalogue
 from rig.sections.camera import CameraSection
 from rig.sections.limits import LimitsSection
@@ -21,9 +19,9 @@ from rig.sections.poses import FixedSection, StartSection
 from rig.sections.subject import ScanSection, SubjectSection
 from rig.spec import RigSpec
 from rig.strict import StrictModel, validated
+from rig.tomlfile import parsed, read_text
 
 SCHEMA: Literal["rigwright.rig/1"] = "rigwright.rig/1"
-LARGEST_FILE_BYTES = 1_000_000
 """A rig file is a page or two; a larger one is another file given by mistake."""
 
 
@@ -102,34 +100,9 @@ def rig_from_mapping(
 
 def parse_rig(text: str, name: str = "rig", catalogue: Catalogue | None = None) -> RigSpec:
     """A rig from the text of a rig file; raises a one-line :class:`InputError`."""
-    try:
-        data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(
-            "rig-not-toml", f"{name} is not a rig file: {error}", "write it as TOML"
-        ) from error
-    return rig_from_mapping(data, name, catalogue)
+    return rig_from_mapping(parsed(text, name, "rig", "rig file"), name, catalogue)
 
 
 def read_rig(path: Path, catalogue: Catalogue | None = None) -> RigSpec:
     """A rig from a file; raises a one-line :class:`InputError`."""
-    try:
-        if path.stat().st_size > LARGEST_FILE_BYTES:
-            raise TooLargeError(
-                "rig-too-large",
-                f"{path.name} is too large for a rig file",
-                "give the rig's TOML file",
-            )
-        text = path.read_text(encoding="utf-8")
-    except OSError as error:
-        reason = error.strerror or "unreadable"
-        raise InputError(
-            "rig-unreadable",
-            f"cannot read the rig file {path} ({reason.lower()})",
-            "check the path",
-        ) from error
-    except UnicodeDecodeError as error:
-        raise InputError(
-            "rig-not-toml", f"{path.name} is not a text file", "give the rig's TOML file"
-        ) from error
-    return parse_rig(text, path.name, catalogue)
+    return parse_rig(read_text(path, "rig", "rig file"), path.name, catalogue)

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from calibration.adjustment.camera import INTERIOR, PER_CAMERA
+from calibration.adjustment.camera import PER_CAMERA
 from calibration.adjustment.model import Sight
 from geometry.arrays import Bools, Floats, Ints
 
@@ -130,13 +130,3 @@ class Network:
     def camera_rows(self) -> Ints:
         """Where the image points of each camera begin and end, (n + 1,)."""
         return np.searchsorted(self.sight.camera, np.arange(self.camera_count + 1))
-
-
-def interior_columns(camera: int) -> slice:
-    """Columns of a camera's interior orientation in the core."""
-    return slice(PER_CAMERA * camera, PER_CAMERA * camera + INTERIOR)
-
-
-def exterior_columns(camera: int) -> slice:
-    """Columns of a camera's exterior orientation in the core."""
-    return slice(PER_CAMERA * camera + INTERIOR, PER_CAMERA * (camera + 1))

@@ -35,12 +35,11 @@ class Ruler:
 
     drawn_mm: float
     measured_mm: float
-    sigma_mm: float = 0.1
 
     def __post_init__(self) -> None:
-        good = np.isfinite([self.drawn_mm, self.measured_mm, self.sigma_mm]).all()
+        good = np.isfinite([self.drawn_mm, self.measured_mm]).all()
         _require(
-            bool(good) and min(self.drawn_mm, self.measured_mm, self.sigma_mm) > 0.0,
+            bool(good) and min(self.drawn_mm, self.measured_mm) > 0.0,
             "ruler",
             f"a ruler of {self.drawn_mm:g} mm measured as {self.measured_mm:g} mm cannot be",
             "give positive lengths in millimetres",

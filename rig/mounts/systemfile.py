@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -14,7 +13,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from geometry.errors import InputError, NotFoundError, TooLargeError
+from geometry.errors import InputError, NotFoundError
 from rig.catalogue import Catalogue, load_catalogue
 from rig.mounts.making import SystemSpec
 from rig.mounts.surroundings import Zone
@@ -25,9 +24,9 @@ from rig.mounts.systems.parts import outrigger_of, plate_of, profile_named, stan
 from rig.mounts.systems.tripods import TripodSystem
 from rig.mounts.systems.tslot import TSlotSystem
 from rig.strict import StrictModel, Vector, validated
+from rig.tomlfile import parsed, read_text
 
 SCHEMA: Literal["rigwright.mount/1"] = "rigwright.mount/1"
-LARGEST_FILE_BYTES = 1_000_000
 
 
 class ZoneSection(StrictModel):
@@ -149,32 +148,9 @@ def system_from_mapping(
 
 def parse_system(text: str, name: str = "mount", catalogue: Catalogue | None = None) -> SystemSpec:
     """A mount system from the text of a file; raises a one-line :class:`InputError`."""
-    try:
-        data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(
-            "mount-not-toml", f"{name} is not a system file: {error}", "write it as TOML"
-        ) from error
-    return system_from_mapping(data, name, catalogue)
+    return system_from_mapping(parsed(text, name, "mount", "system file"), name, catalogue)
 
 
 def read_system(path: Path, catalogue: Catalogue | None = None) -> SystemSpec:
     """A mount system from a file; raises a one-line :class:`InputError`."""
-    try:
-        if path.stat().st_size > LARGEST_FILE_BYTES:
-            raise TooLargeError(
-                "mount-too-large",
-                f"{path.name} is too large for a system file",
-                "give the mount's TOML file",
-            )
-        text = path.read_text(encoding="utf-8")
-    except OSError as error:
-        reason = (error.strerror or "unreadable").lower()
-        raise InputError(
-            "mount-unreadable", f"cannot read the system file {path} ({reason})", "check the path"
-        ) from error
-    except UnicodeDecodeError as error:
-        raise InputError(
-            "mount-not-toml", f"{path.name} is not a text file", "give the mount's TOML file"
-        ) from error
-    return parse_system(text, path.name, catalogue)
+    return parse_system(read_text(path, "mount", "system file"), path.name, catalogue)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -166,8 +166,3 @@ class Studio:
             problem = f"there is no camera {shot.camera!r}"
             raise NotFoundError("camera", problem, "give a name of the rig")
         return knocked(self.cameras[shot.camera], shot.moved_mm, shot.turned_deg)
-
-    def without_noise(self) -> Studio:
-        """The same studio with sensors of a million times the wells and no read noise."""
-        quiet = replace(self.sensor, full_well_e=1e7, read_noise_e=0.0)
-        return Studio(tuple(self.cameras.values()), self.scene, quiet)

@@ -5,7 +5,6 @@ TOML in files, the same structure as JSON over HTTP. ``docs/station-file.md`` li
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -13,7 +12,7 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from geometry.errors import InputError, TooLargeError
+from geometry.errors import InputError
 from rig.station.sections import (
     CaptureSection,
     LedSection,
@@ -23,9 +22,9 @@ from rig.station.sections import (
 )
 from rig.station.spec import Station
 from rig.strict import StrictModel, validated
+from rig.tomlfile import parsed, read_text
 
 SCHEMA: Literal["rigwright.station/1"] = "rigwright.station/1"
-LARGEST_FILE_BYTES = 1_000_000
 """A station file is a page or two; a larger one is another file given by mistake."""
 
 
@@ -96,34 +95,11 @@ def station_from_mapping(
 
 def parse_station(text: str, name: str = "station", folder: Path | None = None) -> Station:
     """A station from the text of a station file; raises a one-line :class:`InputError`."""
-    try:
-        data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(
-            "station-not-toml", f"{name} is not a station file: {error}", "write it as TOML"
-        ) from error
+    data = parsed(text, name, "station", "station file")
     return replace(station_from_mapping(data, name, folder), text=text)
 
 
 def read_station(path: Path) -> Station:
     """A station from a file; raises a one-line :class:`InputError`."""
-    try:
-        if path.stat().st_size > LARGEST_FILE_BYTES:
-            raise TooLargeError(
-                "station-too-large",
-                f"{path.name} is too large for a station file",
-                "give the station's TOML file",
-            )
-        text = path.read_text(encoding="utf-8")
-    except OSError as error:
-        reason = error.strerror or "unreadable"
-        raise InputError(
-            "station-unreadable",
-            f"cannot read the station file {path} ({reason.lower()})",
-            "check the path",
-        ) from error
-    except UnicodeDecodeError as error:
-        raise InputError(
-            "station-not-toml", f"{path.name} is not a text file", "give the station's TOML file"
-        ) from error
+    text = read_text(path, "station", "station file")
     return replace(parse_station(text, path.name, path.parent), path=path)

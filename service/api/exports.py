@@ -2,27 +2,21 @@
 
 from __future__ import annotations
 
-import io
-import zipfile
 from pathlib import Path
-from typing import Any
 
 from fastapi import APIRouter, Response
 
 from calibration.exports import rig_cameras
 from calibration.files import read_calibration
-from geometry.camera import RigCamera
 from geometry.exchange import FORMATS, export_files
 from rig.designfile import read_design
 from service.api.calibrations import resource as calibrations
 from service.api.context import ServiceDep
 from service.api.designs import resource as designs
 from service.api.models import Model, problems
+from service.api.zipped import JSON, ZIP, zipped
 
-JSON = dict[Any, Any]
 router = APIRouter(tags=["exports"])
-_NO_TIME = (1980, 1, 1, 0, 0, 0)
-"""The same design gives the same bytes."""
 
 
 class ExportFormat(Model):
@@ -38,11 +32,6 @@ class ExportList(Model):
     """All formats."""
 
     items: list[ExportFormat]
-
-
-_ZIP: JSON = {
-    200: {"description": "The files, as a ZIP archive.", "content": {"application/zip": {}}}
-}
 
 
 @router.get(designs.path + "/{job_id}/exports", response_model=ExportList, responses=problems(404))
@@ -77,18 +66,18 @@ def _formats(path: str) -> JSON:
 @router.get(
     designs.path + "/{job_id}/exports/{form}",
     response_class=Response,
-    responses=problems(404, 409, 503) | _ZIP,
+    responses=problems(404, 409, 503) | ZIP,
 )
 def read_export(service: ServiceDep, job_id: str, form: str) -> Response:
     """Fetch a design's cameras as one program wants them, in a ZIP archive."""
     design = designs.file(service, job_id, "design.json")
-    return _zipped(form, read_design(Path(design.path)).cameras)
+    return zipped(export_files(form, read_design(Path(design.path)).cameras), f"{form}.zip")
 
 
 @router.get(
     calibrations.path + "/{job_id}/exports/{form}",
     response_class=Response,
-    responses=problems(404, 409, 422, 503) | _ZIP,
+    responses=problems(404, 409, 422, 503) | ZIP,
 )
 def read_calibration_export(service: ServiceDep, job_id: str, form: str) -> Response:
     """Fetch calibrated cameras as one program wants them, in a ZIP archive.
@@ -99,13 +88,4 @@ def read_calibration_export(service: ServiceDep, job_id: str, form: str) -> Resp
     built = service.store.jobs.inputs(job_id).get("design")
     like = () if built is None else read_design(built[1]).cameras
     calibrated = read_calibration(Path(file.path)).calibration
-    return _zipped(form, rig_cameras(calibrated.cameras, like))
-
-
-def _zipped(form: str, cameras: tuple[RigCamera, ...]) -> Response:
-    packed = io.BytesIO()
-    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, content in export_files(form, cameras).items():
-            archive.writestr(zipfile.ZipInfo(name, _NO_TIME), content)
-    headers = {"Content-Disposition": f'attachment; filename="{form}.zip"'}
-    return Response(packed.getvalue(), media_type="application/zip", headers=headers)
+    return zipped(export_files(form, rig_cameras(calibrated.cameras, like)), f"{form}.zip")

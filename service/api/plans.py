@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import io
-import zipfile
 from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Response
@@ -22,10 +20,10 @@ from service.api.models import (
     problems,
 )
 from service.api.submission import submit
+from service.api.zipped import ZIP, zipped
 
 JSON = dict[str, Any]
 router = APIRouter(tags=["plans"])
-_NO_TIME = (1980, 1, 1, 0, 0, 0)
 
 
 class PlanRequest(Model):
@@ -166,20 +164,13 @@ def add_plan(
 
 
 @router.get(
-    resource.path + "/{job_id}/archive",
-    response_class=Response,
-    responses=problems(404, 409)
-    | {200: {"description": "All files, zipped.", "content": {"application/zip": {}}}},
+    resource.path + "/{job_id}/archive", response_class=Response, responses=problems(404, 409) | ZIP
 )
 def read_archive(service: ServiceDep, job_id: str) -> Response:
     """Fetch all files of a plan in one ZIP archive."""
     completed(service, job_id, resource.kind)
-    packed = io.BytesIO()
-    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
-        for file in service.store.jobs.files(job_id):
-            archive.writestr(zipfile.ZipInfo(file.name, _NO_TIME), file.path.read_bytes())
-    headers = {"Content-Disposition": 'attachment; filename="plan.zip"'}
-    return Response(packed.getvalue(), media_type="application/zip", headers=headers)
+    files = {file.name: file.path.read_bytes() for file in service.store.jobs.files(job_id)}
+    return zipped(files, "plan.zip")
 
 
 resource.add_to(router)
