@@ -51,8 +51,8 @@ format: $(STAMP)
 	$(BIN)/ruff format .
 
 docs: $(STAMP)
-	$(BIN)/python -m rig.schemas docs
-	$(BIN)/python -m service.api.document docs/openapi.json
+	$(BIN)/python -m service.reference.schemas docs
+	$(BIN)/python -m service.reference.openapi docs/openapi.json
 
 benchmarks: $(STAMP)
 	$(BIN)/python -m benchmarks.speed

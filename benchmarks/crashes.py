@@ -26,10 +26,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "support"
 
 from memoryrig import MemoryDevices, line_fit, memory_station, with_policy
 
-from rig.capture.rig import open_station
-from rig.session import places
-from rig.session.folder import Session
-from rig.session.verify import verify_session
+from rig.acquisition.capture.rig import open_station
+from rig.acquisition.session import places
+from rig.acquisition.session.folder import Session
+from rig.acquisition.session.verify import verify_session
 
 LONGEST_S = 0.4
 """A capture takes a third of it: kills fall into every part of several captures."""

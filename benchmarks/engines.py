@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from geometry.arrays import Floats
-from solver.programme import Programme
+from solver.nlp.program import Programme
 
 Watch = Callable[[int, float, float], bool]
 """Called with iteration, objective and violation; returns False to stop."""

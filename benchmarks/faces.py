@@ -15,8 +15,8 @@ from pathlib import Path
 from geometry.head import synthetic_head
 from geometry.preparation import prepare_subject
 from geometry.reading import read_scan
-from rig.examples import example_rig
-from rig.layout import make_layout
+from rig.design.layout import make_layout
+from rig.specification.examples import example_rig
 from solver.design import best_strip, design
 from solver.quality import evaluate
 from solver.result import Design, Quality
@@ -83,7 +83,7 @@ def main() -> None:
         name = "the bundled head" if chosen.scan is None else chosen.scan.name
         head = (
             "# Designs for 4 to 9 cameras\n\n"
-            f"Head: {name}. Limits: `rig/data/face.toml`, {chosen.starts} starts. "
+            f"Head: {name}. Limits: `rig/specification/data/face.toml`, {chosen.starts} starts. "
             f"{len(prepared.subject.check_points)} check points.\n"
             "Written by `python -m benchmarks.faces --scan HEAD --out docs/face-designs.md`.\n"
             "Sigma is the longest semi-axis of a point's error ellipsoid at half a pixel of "

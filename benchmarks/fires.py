@@ -21,14 +21,14 @@ from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from geometry.errors import RigwrightError
-from rig.trigger.box import ArmRequest, FireReport, Outcome, Pulse
-from rig.trigger.driver import BoxAddress, SerialTriggerBox
-from rig.trigger.endpoint import PtyEndpoint
-from rig.trigger.fake.device import FakeSettings
-from rig.trigger.fake.program import FakeTrigger, start_fake
-from rig.trigger.faultscript import FaultRates, ProxyScript
-from rig.trigger.proxy import FaultProxy
+from common.errors import RigwrightError
+from rig.acquisition.trigger.box import ArmRequest, FireReport, Outcome, Pulse
+from rig.acquisition.trigger.driver import BoxAddress, SerialTriggerBox
+from rig.acquisition.trigger.endpoint import PtyEndpoint
+from rig.acquisition.trigger.fake.device import FakeSettings
+from rig.acquisition.trigger.fake.program import FakeTrigger, start_fake
+from rig.acquisition.trigger.faultscript import FaultRates, ProxyScript
+from rig.acquisition.trigger.proxy import FaultProxy
 
 FAULT_RATE = 0.05
 MISHAP_RATE = 0.01

@@ -17,21 +17,21 @@ from pathlib import Path
 
 import numpy as np
 
+from common.errors import RigwrightError
 from geometry.camera import RigCamera
-from geometry.errors import RigwrightError
 from geometry.frames import Pose
 from geometry.head import synthetic_head
 from geometry.preparation import PreparedSubject, prepare_subject
 from geometry.reading import read_scan
-from rig.designfile import design_document, read_design
-from rig.examples import example_rig
-from rig.mounts.making import make_plan
-from rig.mounts.plan import MountPlan
-from rig.mounts.systemfile import system_from_mapping
-from rig.spec import RigSpec
+from rig.build.mounts.making import make_plan
+from rig.build.mounts.plan import MountPlan
+from rig.build.mounts.systemfile import system_from_mapping
+from rig.design.designfile import design_document, read_design
+from rig.specification.examples import example_rig
+from rig.specification.spec import RigSpec
 from solver.design import design
 from solver.limits import BaseHeight, Coverage, CoverageTier, Limits
-from solver.scene import camera_at
+from solver.problem import camera_at
 
 COUNTS = (4, 5, 6, 7, 8, 9)
 KINDS = ("t-slot", "plate", "arc")

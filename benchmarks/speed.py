@@ -24,16 +24,16 @@ os.environ.update(
 import numpy as np
 
 from benchmarks.oracle import cost_expression
+from common.progress import NeverCancelled
 from geometry.head import synthetic_head
 from geometry.preparation import SubjectOptions, prepare_subject
-from rig.examples import example_rig
-from solver.coverage import views
+from rig.specification.examples import example_rig
+from solver.coverage.visibilitycuts import views
 from solver.information import CovarianceCost
-from solver.progress import NeverCancelled
-from solver.rounds import all_candidates, covariance_cost, run_start, unknown_bounds
-from solver.scene import Scene
-from solver.sqp import Outcome, minimise
-from solver.sqpstate import Task
+from solver.nlp.iterate import Task
+from solver.nlp.sqp import Outcome, minimise
+from solver.outerloop import all_candidates, covariance_cost, run_start, unknown_bounds
+from solver.problem import Scene
 from solver.starts import kmeans_start
 
 CASES = ((9, 1000), (9, 5000), (24, 3000))

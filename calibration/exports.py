@@ -11,8 +11,8 @@ from dataclasses import replace
 import numpy as np
 
 from calibration.adjustment.camera import CalibratedCamera
+from common.errors import InputError
 from geometry.camera import Body, Camera, RigCamera
-from geometry.errors import InputError
 
 FULL_FRAME_MM = 36.0
 """Width of the sensor that is written where nobody says how large it is: pixels alone count."""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from common.errors import InputError
 from geometry.arrays import Bools, Floats
 from geometry.camera import RigCamera, undistort
-from geometry.errors import InputError
 
 _ITERATIONS = 12
 

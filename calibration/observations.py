@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from common.errors import InputError
 from geometry.arrays import Floats, Ints, frozen
-from geometry.errors import InputError
 
 
 def _require(condition: bool, detail: str, problem: str, remedy: str) -> None:

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from common.errors import InputError
 from geometry.arrays import Floats, Ints
-from geometry.errors import InputError
 
 DIRECTIONS = {
     sign + name: (1.0 if sign == "+" else -1.0) * np.eye(3)[index]

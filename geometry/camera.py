@@ -7,8 +7,8 @@ from typing import Self
 
 import numpy as np
 
+from common.errors import InputError
 from geometry.arrays import Floats, frozen
-from geometry.errors import InputError
 from geometry.frames import Pose
 
 NO_DISTORTION = frozen(np.zeros(5))

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from common.errors import InputError
 from geometry.arrays import Bools, Floats, Ints
-from geometry.errors import InputError
 from geometry.loading import RawScan
 from geometry.scan import ScanNote
 

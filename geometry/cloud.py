@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from common.errors import InputError
 from geometry.arrays import Floats, Ints
 from geometry.cleaning import unique_rows
-from geometry.errors import InputError
 from geometry.loading import RawScan
 from geometry.scan import ScanNote
 

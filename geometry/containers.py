@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import IO, Any
 from urllib.parse import unquote
 
-from geometry.errors import InputError, TooLargeError
+from common.errors import InputError, TooLargeError
 from geometry.scanlimits import MAX_FILE_BYTES, check_counts, format_error
 
 _GLB_HEADER_BYTES = 20

@@ -10,8 +10,8 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from common.errors import InputError
 from geometry.arrays import Bools, Floats, frozen
-from geometry.errors import InputError
 from geometry.frames import FORWARD_RIG
 from geometry.raycast import Occluder
 from geometry.scan import Scan

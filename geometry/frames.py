@@ -17,8 +17,8 @@ from typing import Self
 
 import numpy as np
 
+from common.errors import InputError
 from geometry.arrays import Floats, frozen
-from geometry.errors import InputError
 
 PHOTO_TO_CV = frozen(np.diag([1.0, -1.0, -1.0]))
 """Maps the photogrammetric image frame (x right, y up, looking along -z) to OpenCV's."""

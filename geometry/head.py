@@ -7,8 +7,8 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from common.errors import InputError
 from geometry.arrays import Floats
-from geometry.errors import InputError
 from geometry.head_field import NECK_CUT_Z_MM, TEMPLATE_SIZE_MM, Measures, head_distance
 from geometry.scan import Scan, ScanNote, vertex_normals
 from geometry.surface_nets import grid_values, largest_piece, settle, surface_nets, unambiguous

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from common.errors import InputError, RigwrightError
 from geometry.arrays import Floats, Ints
-from geometry.errors import InputError, RigwrightError
 from geometry.scanlimits import check_counts, format_error
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from geometry.errors import InputError
+from common.errors import InputError
 from geometry.face import FaceRegion, RegionBox, RegionSphere, find_face
 from geometry.raycast import Occluder
 from geometry.sampling import surface_samples, voxel_downsample, voxel_size_for

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
+from common.errors import InputError
 from geometry.arrays import Floats, Ints
 from geometry.axes import DIRECTIONS, GLTF_AXES, RIG_AXES, Axes, infer_axes, surface_samples
 from geometry.cleaning import clean_mesh, drop_not_finite
 from geometry.cloud import clean_cloud
-from geometry.errors import InputError
 from geometry.loading import RawScan, load_raw
 from geometry.scan import Scan, ScanNote, vertex_normals
 from geometry.sniffing import check_file

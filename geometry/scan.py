@@ -7,8 +7,8 @@ from typing import Literal
 
 import numpy as np
 
+from common.errors import InputError
 from geometry.arrays import Floats, Ints, frozen, frozen_ints
-from geometry.errors import InputError
 from geometry.raycast import Occluder
 
 _SURFEL_SIZE = 0.75

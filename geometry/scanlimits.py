@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from geometry.errors import InputError, TooLargeError
+from common.errors import InputError, TooLargeError
 
 MAX_FILE_BYTES = 1 << 30
 """Largest scan file, and largest sum of what it unpacks to or refers to."""

@@ -6,8 +6,8 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
+from common.errors import InputError, NotFoundError, TooLargeError
 from geometry.containers import check_glb, check_gltf, check_threemf
-from geometry.errors import InputError, NotFoundError, TooLargeError
 from geometry.scanlimits import MAX_FILE_BYTES, check_counts, format_error
 
 KINDS = {

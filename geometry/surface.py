@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from common.errors import InputError
 from geometry.arrays import Floats, frozen
-from geometry.errors import InputError
 
 
 @dataclass(frozen=True, eq=False)

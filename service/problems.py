@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from geometry.errors import RigwrightError
+from common.errors import RigwrightError
 from service.wire import error_from_fields
 
 MEDIA_TYPE = "application/problem+json"

@@ -11,7 +11,7 @@ from types import FrameType
 import uvicorn
 from fastapi import FastAPI
 
-from geometry.errors import InputError
+from common.errors import InputError
 from service.api.context import Service
 
 _GRACE_S = 5

@@ -9,7 +9,7 @@ from typing import Annotated
 from pydantic import Field, ValidationError, field_validator
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
-from geometry.errors import InputError
+from common.errors import InputError
 
 PREFIX = "RIGWRIGHT_"
 

@@ -7,7 +7,7 @@ import json
 import math
 from typing import Any
 
-from geometry import errors
+from common import errors
 
 _KINDS: dict[str, type[errors.RigwrightError]] = {
     kind.kind: kind

@@ -11,17 +11,17 @@ from typing import Any
 
 import trimesh
 
+from common.progress import CancelToken, Progress, ProgressCallback
 from geometry.camera import RigCamera
 from geometry.preparation import PreparedSubject, prepare_subject
 from geometry.reading import read_scan
 from geometry.scan import Scan
-from rig.designfile import evaluation_document
-from rig.files import write_design_folder
-from rig.layout import Layout, make_layout
-from rig.spec import RigSpec
+from rig.design.designfile import evaluation_document
+from rig.design.designfolder import write_design_folder
+from rig.design.layout import Layout, make_layout
+from rig.specification.spec import RigSpec
 from service.wire import plain
 from solver.design import design
-from solver.progress import CancelToken, Progress, ProgressCallback
 from solver.quality import evaluate
 from solver.result import Design, Quality
 

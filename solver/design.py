@@ -7,21 +7,21 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from common.errors import CancelledError, InputError
+from common.progress import CancelToken, NeverCancelled, Progress, ProgressCallback, ignore_progress
 from geometry.arrays import Floats
 from geometry.camera import Camera, RigCamera
-from geometry.errors import CancelledError, InputError
 from geometry.frames import Pose
 from geometry.subject import Subject
-from solver.coverage import judge
-from solver.diagnosis import conflicts
+from solver.coverage.visibilitycuts import judge
+from solver.infeasibility import conflicts
 from solver.limits import Limits
-from solver.polish import polish
+from solver.outerloop import MAX_ROUNDS, StartResult
 from solver.pool import StartJob, run_all
-from solver.progress import CancelToken, NeverCancelled, Progress, ProgressCallback, ignore_progress
+from solver.problem import Scene, camera_at
 from solver.quality import evaluate
+from solver.refinement import polish
 from solver.result import Concession, Design, Quality, SolverReport, StartReport, Status
-from solver.rounds import MAX_ROUNDS, StartResult
-from solver.scene import Scene, camera_at
 from solver.starts import kmeans_start, strips
 
 ENGINE = "sequential quadratic programming with exact second derivatives (PIQP)"

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from common.errors import InputError
 from geometry.arrays import Floats, frozen
-from geometry.errors import InputError
 
 
 def _bad(problem: str, remedy: str) -> InputError:

@@ -16,10 +16,10 @@ from typing import Protocol
 
 from threadpoolctl import threadpool_limits
 
-from geometry.errors import CancelledError
-from solver.progress import CancelToken
-from solver.rounds import Report, StartResult, run_start
-from solver.scene import Scene
+from common.errors import CancelledError
+from common.progress import CancelToken
+from solver.outerloop import Report, StartResult, run_start
+from solver.problem import Scene
 
 _BLAS_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 _POLL_S = 0.05

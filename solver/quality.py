@@ -6,20 +6,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from common.errors import InputError
 from geometry.arrays import Bools, Floats
 from geometry.camera import RigCamera
-from geometry.errors import InputError
 from geometry.frames import Pose
 from geometry.optics import blur_disk_mm, depth_of_field_mm, ground_sample_distance_mm
 from geometry.subject import Subject
-from solver.constrainttable import constraint_table
-from solver.coverage import in_frame
+from solver.constraints.table import constraint_table
+from solver.coverage.visibility import sight
+from solver.coverage.visibilitycuts import in_frame
 from solver.information import normal_matrices
 from solver.limits import Limits
 from solver.motion import HeadPosition
+from solver.problem import Scene
 from solver.result import CameraTable, CoverageShare, PointTable, Quality
-from solver.scene import Scene
-from solver.visibility import sight
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,7 @@ from geometry.optics import blur_ratio
 from geometry.subject import Subject
 from geometry.surface import SurfacePoints
 from solver.limits import Limits
-from solver.scene import camera_at
+from solver.problem import camera_at
 
 _FARTHEST_RADII = 100.0
 _JITTER_DEG = 12.0

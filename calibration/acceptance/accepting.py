@@ -26,9 +26,9 @@ from calibration.adjustment.finite import finite_rows
 from calibration.adjustment.forward import Points, intersected
 from calibration.adjustment.result import Calibration
 from calibration.observations import Observations
+from common.errors import CancelledError, InputError
+from common.progress import CancelToken, NeverCancelled, Progress, ProgressCallback, ignore_progress
 from geometry.arrays import Floats, Ints
-from geometry.errors import CancelledError, InputError
-from solver.progress import CancelToken, NeverCancelled, Progress, ProgressCallback, ignore_progress
 
 ARTEFACT_SHARE = 0.2
 """An artefact less certain than this share of the limit decides nothing."""

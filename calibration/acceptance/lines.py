@@ -7,7 +7,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from geometry.errors import InputError
+from common.errors import InputError
 
 LEAST_LINES = 7
 LEAST_LENGTHS = 5

@@ -16,8 +16,8 @@ from calibration.adjustment.start.resection import Placed
 from calibration.adjustment.start.views import Placements, spread_rank
 from calibration.adjustment.state import State, camera_arrays
 from calibration.observations import Observations
+from common.errors import InputError
 from geometry.arrays import Bools, Floats, Ints
-from geometry.errors import InputError
 
 LOOSE_TURN_RAD = 1.0
 """Turns of a bar about itself are kept near their start by this; nothing else could."""

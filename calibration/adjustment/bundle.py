@@ -38,9 +38,9 @@ from calibration.adjustment.settling import late_points, settle
 from calibration.adjustment.stages import NEAR_DAMPING, adjust_in_stages
 from calibration.adjustment.start.finding import find_start
 from calibration.observations import Observations
+from common.errors import InputError
+from common.progress import CancelToken, Progress, ProgressCallback, ignore_progress
 from geometry.arrays import Bools, Ints
-from geometry.errors import InputError
-from solver.progress import CancelToken, Progress, ProgressCallback, ignore_progress
 
 ROUNDS = 8
 SETTLED = 0.01

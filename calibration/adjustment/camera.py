@@ -7,9 +7,9 @@ from typing import Self
 
 import numpy as np
 
+from common.errors import InputError
 from geometry.arrays import Floats, frozen
 from geometry.camera import NO_DISTORTION, RigCamera, distort, undistort
-from geometry.errors import InputError
 from geometry.frames import Pose
 
 INTERIOR_NAMES = ("f", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "b1")

@@ -7,8 +7,8 @@ import numpy as np
 from calibration.adjustment.finite import finite_rows
 from calibration.adjustment.start.views import Placements, View, is_planar, views_of
 from calibration.observations import Observations
+from common.errors import InputError
 from geometry.arrays import Floats
-from geometry.errors import InputError
 
 LEAST_ROWS = 6
 

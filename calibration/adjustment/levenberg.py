@@ -12,9 +12,9 @@ from calibration.adjustment.network import Network
 from calibration.adjustment.normals import Assembler, Residuals, prior_cost, residuals
 from calibration.adjustment.reduction import Reduction, SingularError
 from calibration.adjustment.state import State
+from common.errors import CancelledError
+from common.progress import CancelToken, NeverCancelled, Progress, ProgressCallback, ignore_progress
 from geometry.arrays import Floats
-from geometry.errors import CancelledError
-from solver.progress import CancelToken, NeverCancelled, Progress, ProgressCallback, ignore_progress
 
 MOST = 0.9
 MOST_OF_NORMS = 2.146

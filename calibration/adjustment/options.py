@@ -9,8 +9,8 @@ import numpy as np
 
 from calibration.adjustment.camera import INTERIOR_NAMES, CalibratedCamera, Interior
 from calibration.adjustment.levenberg import LossOptions
+from common.errors import InputError
 from geometry.arrays import Floats
-from geometry.errors import InputError
 
 FREE = float("inf")
 FIXED = 0.0

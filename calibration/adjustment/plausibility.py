@@ -12,7 +12,7 @@ from calibration.adjustment.network import Network
 from calibration.adjustment.options import CalibrationOptions
 from calibration.adjustment.start.frame import centre_of
 from calibration.observations import Observations
-from geometry.errors import InputError
+from common.errors import InputError
 
 WORST_RMS_SHARE = 0.01
 """Half the image points farther off than this share of the width is no fit of any kind."""

@@ -6,12 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calibration.adjustment.camera import (
-    INTERIOR,
-    INTERIOR_NAMES,
-    POSE_NAMES,
-    CalibratedCamera,
-)
+from calibration.adjustment.camera import INTERIOR, INTERIOR_NAMES, POSE_NAMES, CalibratedCamera
 from calibration.adjustment.components import Component
 from calibration.adjustment.covariance import Covariance
 from calibration.adjustment.datum import reach_mm

@@ -13,7 +13,7 @@ from calibration.adjustment.camera import INTERIOR_NAMES
 from calibration.adjustment.levenberg import LossOptions, Solution, adjust
 from calibration.adjustment.network import Network
 from calibration.adjustment.state import State
-from solver.progress import CancelToken, ProgressCallback, ignore_progress
+from common.progress import CancelToken, ProgressCallback, ignore_progress
 
 UNKNOWN_LENSES = ("f", "k1")
 """What the first stage frees of lenses of which nothing is known."""

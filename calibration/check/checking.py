@@ -23,17 +23,10 @@ from calibration.check.tables import (
     noise_of,
     power95_factor,
 )
-from calibration.check.verdicts import (
-    STOPPING,
-    CameraCheck,
-    CheckResult,
-    Finding,
-    Kind,
-    Light,
-)
+from calibration.check.verdicts import STOPPING, CameraCheck, CheckResult, Finding, Kind, Light
 from calibration.observations import Observations
-from geometry.errors import CancelledError, InputError
-from solver.progress import CancelToken, NeverCancelled, Progress, ProgressCallback, ignore_progress
+from common.errors import CancelledError, InputError
+from common.progress import CancelToken, NeverCancelled, Progress, ProgressCallback, ignore_progress
 
 UNEXPLAINED = 2.0
 """What is left may not be more than this many times the expected misfit."""

@@ -11,8 +11,8 @@ from calibration.adjustment.result import Calibration
 from calibration.adjustment.start.views import Placements
 from calibration.check.reference import Reference
 from calibration.observations import Observations
+from common.errors import InputError
 from geometry.arrays import Bools, Floats, Ints
-from geometry.errors import InputError
 
 LEAST_CAMERAS = 2
 

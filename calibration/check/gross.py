@@ -11,8 +11,8 @@ from scipy.optimize import linear_sum_assignment
 from calibration.check.agreement import agreeing
 from calibration.check.consensus import Consensus, by_camera, consensus, misfit_px
 from calibration.check.epoch import Epoch
+from common.errors import InputError
 from geometry.arrays import Bools, Floats, Ints
-from geometry.errors import InputError
 
 BAD_PX = 8.0
 """Half of a camera's points farther off than this: its images are not those of its reference."""

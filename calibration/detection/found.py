@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from calibration.detection.gates import Rejection
+from common.errors import InputError
 from geometry.arrays import Floats, frozen
-from geometry.errors import InputError
 
 SIGMA_FLOOR_PX = 0.01
 """Added in squares to the sigma of each fit: fits of a hundredth of a pixel tell of the noise,

@@ -7,7 +7,7 @@ from enum import Enum
 
 import numpy as np
 
-from geometry.errors import InputError
+from common.errors import InputError
 
 
 class Rule(Enum):

@@ -14,7 +14,7 @@ import numpy as np
 
 from calibration.detection import opencv
 from calibration.detection.opencv import AnyImage, Bytes
-from geometry.errors import InputError
+from common.errors import InputError
 
 if TYPE_CHECKING:
     from PIL.Image import Image

@@ -15,8 +15,8 @@ import cv2 as _cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from common.errors import InputError
 from geometry.arrays import Bools, Floats, Ints
-from geometry.errors import InputError
 
 Bytes = NDArray[np.uint8]
 AnyImage = NDArray[Any]

@@ -19,8 +19,8 @@ from calibration.detection.opencv import AnyImage
 from calibration.detection.selftest import require_opencv
 from calibration.observations import Observations
 from calibration.targets.kinds import TargetPlan
-from geometry.errors import CancelledError, InputError
-from solver.progress import CancelToken, NeverCancelled, Progress, ProgressCallback, ignore_progress
+from common.errors import CancelledError, InputError
+from common.progress import CancelToken, NeverCancelled, Progress, ProgressCallback, ignore_progress
 
 _POLL_S = 0.1
 _EXPLAINED = 3

@@ -13,9 +13,9 @@ from calibration.detection.opencv import Bytes
 from calibration.targets.kinds import CharucoPlate, TargetPlan
 from calibration.targets.patterns import plate_pattern
 from calibration.targets.rendering import PlacedPattern, photographed, render
+from common.errors import DeviceError
 from geometry.arrays import Floats, Ints
 from geometry.camera import Body, Camera
-from geometry.errors import DeviceError
 
 LARGEST_BIAS_PX = 0.05
 _OWN_LIMIT_PX = 0.01

@@ -13,12 +13,12 @@ from annotated_types import Len
 from calibration.adjustment.camera import CalibratedCamera, Interior
 from calibration.adjustment.noise import NoiseModel
 from calibration.adjustment.result import Calibration, CalibrationQuality, Place
-from calibration.edge.strict import StrictModel, model_of, parsed, plain, record_of
-from calibration.edge.writing import read_limited, write_whole
 from calibration.files.packing import PackedCovariance, compact, packed, unpacked
 from calibration.observations import Carrier, Distance, TargetSet
+from common.errors import InputError
+from common.files.records import StrictModel, model_of, parsed, plain, record_of
+from common.files.writing import read_limited, write_whole
 from geometry.arrays import Floats
-from geometry.errors import InputError
 from geometry.frames import Pose
 
 SCHEMA = "rigwright.calibration/1"

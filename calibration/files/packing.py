@@ -10,9 +10,9 @@ import numpy as np
 
 from calibration.adjustment.camera import PER_CAMERA
 from calibration.adjustment.covariance import Covariance
-from calibration.edge.strict import StrictModel
+from common.errors import InputError
+from common.files.records import StrictModel
 from geometry.arrays import Floats
-from geometry.errors import InputError
 
 LARGEST_ROWS = 20_000
 

@@ -8,8 +8,8 @@ from typing import Any, Generic, Literal, TypeVar
 
 from pydantic import Field, create_model
 
-from calibration.edge.strict import StrictModel, model_of, parsed, plain, record_of
-from calibration.edge.writing import read_limited, write_whole
+from common.files.records import StrictModel, model_of, parsed, plain, record_of
+from common.files.writing import read_limited, write_whole
 
 RecordT = TypeVar("RecordT")
 

@@ -13,8 +13,8 @@ import numpy as np
 from calibration.detection import opencv
 from calibration.targets.kinds import CarrierKind, CharucoPlate, MarkerCarrier
 from calibration.targets.patterns import Pattern, marker_pattern, plate_pattern, ring_pattern
+from common.errors import InputError
 from geometry.arrays import Floats
-from geometry.errors import InputError
 
 PX_PER_MM = 12.0
 MOST_PIXELS = 20_000_000

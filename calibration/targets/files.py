@@ -9,8 +9,6 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from calibration.edge.strict import one_line
-from calibration.edge.writing import write_whole
 from calibration.observations import Distance
 from calibration.targets.filekeys import (
     MarkersModel,
@@ -32,7 +30,9 @@ from calibration.targets.kinds import (
     marker_numbers,
 )
 from calibration.targets.ringcodes import RingCodeFamily
-from geometry.errors import InputError
+from common.errors import InputError
+from common.files.records import one_line
+from common.files.writing import write_whole
 
 SCHEMA = "rigwright.targets/1"
 LARGEST_BYTES = 5_000_000

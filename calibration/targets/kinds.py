@@ -12,8 +12,8 @@ import numpy as np
 
 from calibration.observations import Carrier, Distance, TargetSet
 from calibration.targets.ringcodes import RingCodeFamily
+from common.errors import InputError
 from geometry.arrays import Floats
-from geometry.errors import InputError
 
 UNKNOWN_MM = (float("nan"),) * 3
 RING_INNER, RING_OUTER, RING_QUIET = 2.0, 3.0, 4.0
@@ -35,11 +35,12 @@ class Ruler:
 
     drawn_mm: float
     measured_mm: float
+    sigma_mm: float = 0.1
 
     def __post_init__(self) -> None:
-        good = np.isfinite([self.drawn_mm, self.measured_mm]).all()
+        good = np.isfinite([self.drawn_mm, self.measured_mm, self.sigma_mm]).all()
         _require(
-            bool(good) and min(self.drawn_mm, self.measured_mm) > 0.0,
+            bool(good) and min(self.drawn_mm, self.measured_mm, self.sigma_mm) > 0.0,
             "ruler",
             f"a ruler of {self.drawn_mm:g} mm measured as {self.measured_mm:g} mm cannot be",
             "give positive lengths in millimetres",

@@ -25,8 +25,8 @@ from calibration.targets.kinds import (
     MarkerCarrier,
     RingCarrier,
 )
+from common.errors import InputError
 from geometry.arrays import Floats
-from geometry.errors import InputError
 
 if TYPE_CHECKING:
     from reportlab.pdfgen.canvas import Canvas

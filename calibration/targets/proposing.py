@@ -18,9 +18,9 @@ from calibration.targets.kinds import (
 )
 from calibration.targets.ringcodes import RingCodeFamily
 from calibration.targets.sheets import scale_bar
+from common.errors import InputError
 from geometry.arrays import Bools, Floats, Ints
 from geometry.camera import RigCamera
-from geometry.errors import InputError
 
 DOT_RADIUS_PX, LARGEST_DOT_PX = 5.0, 30.0
 """A dot's smaller radius where it is smallest, and its larger one where it is largest."""

@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-from geometry.errors import InputError
+from common.errors import InputError
 
 BITS = (12, 14)
 

@@ -5,14 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from calibration.observations import Distance
-from calibration.targets.kinds import (
-    RING_QUIET,
-    MarkerCarrier,
-    Place,
-    RingCarrier,
-)
+from calibration.targets.kinds import RING_QUIET, MarkerCarrier, Place, RingCarrier
 from calibration.targets.ringcodes import RingCodeFamily
-from geometry.errors import InputError
+from common.errors import InputError
 
 PRINT_SIGMA_MM = (0.05, 0.05, 0.1)
 """How well places on a good print on flat board are known: across, down, and off the plane."""

@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
+from common.errors import InputError
 from geometry.camera import RigCamera
-from geometry.errors import InputError
 
 Cameras = tuple[RigCamera, ...]
 Files = Mapping[str, bytes]

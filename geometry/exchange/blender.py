@@ -11,11 +11,7 @@ import json
 
 from geometry.camera import RigCamera
 from geometry.exchange.base import Cameras, ExportOptions, Files, Format, image_name
-from geometry.exchange.conventions import (
-    METRES_PER_MM,
-    graphics_camera_to_rig,
-    principal_offset_px,
-)
+from geometry.exchange.conventions import METRES_PER_MM, graphics_camera_to_rig, principal_offset_px
 
 _SCRIPT = '''\
 """Builds the cameras of a rig. Run it in Blender's text editor, or: blender --python FILE"""

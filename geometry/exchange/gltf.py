@@ -15,11 +15,7 @@ import numpy as np
 from geometry.arrays import Floats
 from geometry.camera import Camera, RigCamera
 from geometry.exchange.base import Cameras, ExportOptions, Files, Format, image_name
-from geometry.exchange.conventions import (
-    GLTF_FROM_RIG_AXES,
-    METRES_PER_MM,
-    graphics_camera_to_rig,
-)
+from geometry.exchange.conventions import GLTF_FROM_RIG_AXES, METRES_PER_MM, graphics_camera_to_rig
 
 MARKER_DEPTH_M = 0.05
 NEAR_M, FAR_M = 0.01, 10.0

@@ -10,9 +10,9 @@ import json
 
 import numpy as np
 
+from common.errors import InputError
 from geometry.arrays import Floats
 from geometry.camera import Camera, RigCamera
-from geometry.errors import InputError
 from geometry.exchange.base import Cameras, ExportOptions, Files, Format
 from geometry.exchange.conventions import METRES_PER_MM, number_lists, translation_mm
 

@@ -7,7 +7,7 @@ import secrets
 import shutil
 from pathlib import Path
 
-from geometry.errors import ConflictError, InputError, NotFoundError
+from common.errors import ConflictError, InputError, NotFoundError
 from geometry.exchange import (
     blender,
     caliscope,

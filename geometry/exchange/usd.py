@@ -11,8 +11,8 @@ import re
 from importlib import import_module
 from typing import Any
 
+from common.errors import InputError
 from geometry.camera import RigCamera
-from geometry.errors import InputError
 from geometry.exchange.base import Cameras, ExportOptions, Files, Format, image_name, image_stem
 from geometry.exchange.conventions import (
     CENTIMETRES_PER_MM,

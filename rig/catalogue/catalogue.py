@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, fields
 from types import MappingProxyType
 from typing import TypeVar
 
-from geometry.errors import NotFoundError
+from common.errors import NotFoundError
 from rig.catalogue.items import (
     Bracket,
     CatalogueCamera,

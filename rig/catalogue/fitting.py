@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from geometry.errors import InputError, NotFoundError
+from common.errors import InputError, NotFoundError
 from rig.catalogue.catalogue import Catalogue, PartT
 from rig.catalogue.items import FIXED, CatalogueCamera, CatalogueLens
 

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import fields
 from typing import Any
 
-from geometry.errors import InputError
+from common.errors import InputError
 from rig.catalogue.catalogue import Catalogue
 from rig.catalogue.items import Adapter, CatalogueCamera, Part
 from rig.catalogue.model import ENTRIES
@@ -112,7 +112,7 @@ def _meets(row: Row, condition: tuple[str, str, str]) -> bool:
 def catalogue_entry(catalogue: Catalogue, wanted: str) -> dict[str, Any]:
     """One part by id or name with each figure's source, JSON-able.
 
-    Raises :class:`geometry.errors.NotFoundError` with the nearest ones.
+    Raises :class:`common.errors.NotFoundError` with the nearest ones.
     """
     table, part = catalogue.find(wanted)
     row = _row(table, part)

@@ -12,7 +12,8 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from geometry.errors import InputError, TooLargeError
+from common.errors import InputError, TooLargeError
+from common.files.strict import StrictModel, validated
 from rig.catalogue.catalogue import Catalogue
 from rig.catalogue.items import (
     Adapter,
@@ -27,7 +28,6 @@ from rig.catalogue.items import (
     Source,
 )
 from rig.catalogue.model import ENTRIES, NOT_FIGURES, Entry, MountEntry
-from rig.strict import StrictModel, validated
 
 LARGEST_FILE_BYTES = 5_000_000
 Tables = dict[str, dict[str, dict[str, Any]]]

@@ -10,7 +10,7 @@ from typing import Annotated, Literal, Self
 from annotated_types import Len
 from pydantic import ConfigDict, Field, model_validator
 
-from rig.strict import Pair, StrictModel, Vector
+from common.files.strict import Pair, StrictModel, Vector
 
 SCHEMA: Literal["rigwright.catalogue/1"] = "rigwright.catalogue/1"
 SourceKind = Literal[

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from common.page.html import esc
 from geometry.arrays import Floats
 from geometry.camera import RigCamera
 from geometry.subject import Subject
-from rig.bodies import place_body
-from rig.layout import Layout
-from rig.report.markup import esc
-from rig.sight import outline, seen_by
+from rig.design.layout import Layout
+from rig.solids.bodies import place_body
+from rig.solids.sight import outline, seen_by
 
 BEYOND = 0.12
 """How much of the surroundings of an image is drawn, as a share of its width."""

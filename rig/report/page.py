@@ -8,10 +8,11 @@ from importlib.resources import files
 from string import Template
 from typing import TYPE_CHECKING, Any
 
+from common.page.html import esc
 from geometry.scan import ScanNote
 from geometry.subject import Subject
-from rig.figures import number
-from rig.layout import Layout
+from rig.design.figures import number
+from rig.design.layout import Layout
 from rig.report import sections, summary
 from rig.report.ellipsoids import (
     LARGEST_SHARE,
@@ -23,7 +24,6 @@ from rig.report.ellipsoids import (
     spread_sample,
 )
 from rig.report.errormap import error_maps, sigma_range_mm
-from rig.report.markup import esc
 from rig.report.rigview import rig_figure
 from rig.report.surface import RegionLookup, view_mesh
 from solver.result import Design

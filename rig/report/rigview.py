@@ -6,16 +6,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from common.page.html import esc, figure_text
 from geometry.arrays import Floats
 from geometry.camera import RigCamera
-from rig.bodies import place_body
-from rig.layout import Layout
+from rig.design.layout import Layout
 from rig.report.colours import AFTER, BEFORE, BODY, FIXED
-from rig.report.markup import esc, figure_text
+from rig.report.scene import frustum_corners_mm
 from rig.report.subjectview import subject_traces
 from rig.report.surface import ViewMesh
 from rig.report.three import lines_trace, mesh_trace, scene_layout
-from rig.scene import frustum_corners_mm
+from rig.solids.bodies import place_body
 from solver.result import Design
 
 if TYPE_CHECKING:

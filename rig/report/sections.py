@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from common.page.html import element, esc, figure_text, plot, section
 from geometry.scan import ScanNote
 from geometry.subject import Subject
-from rig.layout import Layout
+from rig.design.layout import Layout
 from rig.report import tables
 from rig.report.drawings import array_drawing, footprint
 from rig.report.ellipsoids import Ellipsoids
-from rig.report.markup import element, esc, figure_text, plot, section
 from solver.result import Design, Status
 
 

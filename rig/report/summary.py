@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-from rig.layout import Layout
+from common.page.html import element, esc, figure_text, percent
+from rig.design.layout import Layout
 from rig.report import tables
-from rig.report.markup import element, esc, figure_text, percent
 from rig.report.words import family_words
 from solver.result import Design
 

@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from geometry.arrays import Bools, Floats, Ints
 from geometry.raycast import Occluder
 from geometry.subject import Subject
-from rig.viewmesh import simplified
+from geometry.viewmesh import simplified
 from solver.result import PointTable
 
 MESH_FACES = 24_000

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from common.page.html import element, esc, figure_text, percent, table
 from geometry.arrays import Floats
-from rig.layout import Layout, Neighbour
-from rig.report.markup import element, esc, figure_text, percent, table
+from rig.design.layout import Layout, Neighbour
 from rig.report.words import family_words
 from solver.result import ConstraintRow, Design, Quality, Sense, SolverReport
 

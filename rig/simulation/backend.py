@@ -15,13 +15,13 @@ from collections.abc import Callable, Sequence
 from types import TracebackType
 from typing import Self
 
+from common.errors import DeviceError, InputError
 from geometry.camera import RigCamera
-from geometry.errors import DeviceError, InputError
-from rig.cameras.base import CameraInfo
+from rig.acquisition.cameras.base import CameraInfo
+from rig.acquisition.trigger.box import Edge, FireReport, TriggerBox
 from rig.simulation.camera import SimulatedCamera, Triggered
 from rig.simulation.pool import RenderPool
 from rig.simulation.settings import SimulationSettings
-from rig.trigger.box import Edge, FireReport, TriggerBox
 
 NAME = "simulated"
 _REMEMBERED = 256

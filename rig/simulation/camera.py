@@ -7,8 +7,8 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from geometry.errors import DeviceError, InputError
-from rig.cameras.base import (
+from common.errors import DeviceError, InputError
+from rig.acquisition.cameras.base import (
     ArmSpec,
     CameraCapabilities,
     CameraHealth,
@@ -50,7 +50,7 @@ class Triggered:
 
 
 class SimulatedCamera:
-    """See :class:`rig.cameras.base.CameraDevice`, whose errors it raises.
+    """See :class:`rig.acquisition.cameras.base.CameraDevice`, whose errors it raises.
 
     ``unplugged`` is told when the camera goes, ``origin`` asked when the head is in its place.
     A camera opened anew goes on where ``former`` left off: its clock and counter do not start

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from geometry.errors import InputError
+from common.errors import InputError
 
 
 def require(condition: bool, what: str, problem: str, remedy: str) -> None:

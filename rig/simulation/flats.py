@@ -8,14 +8,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from common.errors import InputError
 from geometry.arrays import Floats
 from geometry.camera import RigCamera
-from geometry.errors import InputError
+from rig.acquisition.timingboard.reading import TimingBoard, aruco_dictionary
 from rig.simulation.flatsettings import HeldSettings, PlaceSettings, TargetSettings
 from rig.simulation.heads import read_picture
 from rig.simulation.motion import rotation_by
 from rig.simulation.sampling import LINEAR_OF_SRGB, pyramid, sampled
-from rig.timingboard.reading import TimingBoard, aruco_dictionary
 
 Singles = NDArray[np.float32]
 

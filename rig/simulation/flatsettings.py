@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from rig.acquisition.timingboard.reading import TimingBoard
 from rig.simulation.checks import require, require_range
-from rig.timingboard.reading import TimingBoard
 
 Triple = tuple[float, float, float]
 

@@ -6,8 +6,8 @@ from concurrent.futures import CancelledError, Future
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, replace
 
-from geometry.errors import DeviceError, InputError
-from rig.cameras.base import CameraSettings, Frame, FrameStatus, Image
+from common.errors import DeviceError, InputError
+from rig.acquisition.cameras.base import CameraSettings, Frame, FrameStatus, Image
 from rig.simulation.settings import PIXEL_FORMATS
 
 SETTABLE = frozenset({"exposure_us", "gain_db", "f_number", "pixel_format"})

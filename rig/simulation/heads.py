@@ -10,9 +10,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from common.errors import InputError, NotFoundError
 from geometry.arrays import Floats, Ints
 from geometry.cleaning import unique_rows
-from geometry.errors import InputError, NotFoundError
 from geometry.reading import ScanOptions, read_scan
 from rig.simulation.mesh import TexturedMesh
 from rig.simulation.settings import HeadSettings

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from common.errors import InputError
 from geometry.arrays import Floats, Ints
-from geometry.errors import InputError
 from geometry.scan import vertex_normals
 
 _ROUND_THE_FACE = ((0, 1), (1, 2), (2, 0))

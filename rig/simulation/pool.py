@@ -14,7 +14,7 @@ from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPool
 from multiprocessing import connection, get_context, parent_process
 
 from geometry.camera import RigCamera
-from rig.cameras.base import Image
+from rig.acquisition.cameras.base import Image
 from rig.simulation.settings import SceneSettings, SensorSettings
 from rig.simulation.studio import Shot, Studio
 

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.timingboard.reading import linear_light
+from rig.acquisition.timingboard.reading import linear_light
 
 Singles = NDArray[np.float32]
 Picture = NDArray[np.uint8] | NDArray[np.float32]

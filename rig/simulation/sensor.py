@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.cameras.base import Image
+from rig.acquisition.cameras.base import Image
 from rig.simulation.sampling import srgb_of_linear
 from rig.simulation.settings import SensorSettings
 

@@ -1,6 +1,6 @@
 """What can be chosen about the simulated studio: plain numbers, words and paths, all with defaults.
 
-Every object checks itself and raises :class:`~geometry.errors.InputError`. Radiances are shares
+Every object checks itself and raises :class:`~common.errors.InputError`. Radiances are shares
 of what fills the sensor's wells at the reference exposure and aperture; a white card that faces
 the key light has about 1.
 """

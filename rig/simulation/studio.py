@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from common.errors import NotFoundError
 from geometry.camera import RigCamera
-from geometry.errors import NotFoundError
-from rig.cameras.base import Image
+from rig.acquisition.cameras.base import Image
+from rig.acquisition.timingboard.graytime import lit_shares
 from rig.simulation.defocus import defocused, softened
 from rig.simulation.flats import Flat, FlatView, held_up, target, timing_board
 from rig.simulation.imaging import sharp_image
@@ -21,7 +22,6 @@ from rig.simulation.raytable import RayTables
 from rig.simulation.sensor import developed
 from rig.simulation.settings import SceneSettings, SensorSettings
 from rig.simulation.tracing import BackdropView, HeadModel, View
-from rig.timingboard.graytime import lit_shares
 
 Singles = NDArray[np.float32]
 Triple = tuple[float, float, float]

@@ -23,12 +23,7 @@ from rig.simulation.lighting import openness, vertex_light
 from rig.simulation.mesh import TexturedMesh, subdivided
 from rig.simulation.motion import Placement
 from rig.simulation.sampling import LINEAR_OF_SRGB, sampled
-from rig.simulation.settings import (
-    BackdropSettings,
-    HeadSettings,
-    LightSettings,
-    SceneSettings,
-)
+from rig.simulation.settings import BackdropSettings, HeadSettings, LightSettings, SceneSettings
 
 Singles = NDArray[np.float32]
 

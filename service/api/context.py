@@ -9,7 +9,7 @@ from typing import Annotated
 from anyio import CapacityLimiter
 from fastapi import Depends, Request
 
-from geometry.errors import InternalError
+from common.errors import InternalError
 from service.jobs.bell import Bell
 from service.jobs.cancels import Cancels
 from service.jobs.engine import Engine, JobKind

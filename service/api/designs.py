@@ -7,16 +7,10 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Response
 from pydantic import Field
 
-from rig.rigfile import RigFile
+from rig.specification.rigfile import RigFile
 from service.api.context import ServiceDep
 from service.api.job_routes import JobResource
-from service.api.models import (
-    LARGEST_JSON_INTEGER,
-    IdempotencyKeyHeader,
-    Job,
-    Model,
-    problems,
-)
+from service.api.models import LARGEST_JSON_INTEGER, IdempotencyKeyHeader, Job, Model, problems
 from service.api.results import DesignResult
 from service.api.submission import rig_for_scan, submit
 

@@ -12,8 +12,8 @@ from sqlalchemy.exc import OperationalError
 from starlette.exceptions import HTTPException
 from starlette.routing import Match
 
-from geometry.errors import InputError, InternalError, RigwrightError
-from rig.strict import unknown_key
+from common.errors import InputError, InternalError, RigwrightError
+from common.files.strict import unknown_key
 from service.logs import log
 from service.problems import HTTP_ERRORS, MEDIA_TYPE, problem_document
 from service.wire import error_from_fields

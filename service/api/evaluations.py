@@ -7,9 +7,9 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Response
 from pydantic import Field
 
-from rig.designfile import design_from_mapping
-from rig.designmodel import DesignFile
-from rig.rigfile import RigFile, rig_from_mapping
+from rig.design.designfile import design_from_mapping
+from rig.design.designmodel import DesignFile
+from rig.specification.rigfile import RigFile, rig_from_mapping
 from service.api.context import ServiceDep
 from service.api.job_routes import JobResource
 from service.api.models import IdempotencyKeyHeader, Job, Model, problems

@@ -9,7 +9,7 @@ from fastapi import APIRouter, Response
 from calibration.exports import rig_cameras
 from calibration.files import read_calibration
 from geometry.exchange import FORMATS, export_files
-from rig.designfile import read_design
+from rig.design.designfile import read_design
 from service.api.calibrations import resource as calibrations
 from service.api.context import ServiceDep
 from service.api.designs import resource as designs

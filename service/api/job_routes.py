@@ -10,7 +10,7 @@ from fastapi.responses import FileResponse
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 from pydantic import BaseModel
 
-from geometry.errors import ConflictError, NotFoundError
+from common.errors import ConflictError, NotFoundError
 from service.api.context import Service, ServiceDep
 from service.api.models import Cursor, File, FileList, LastEventIdHeader, Limit, problems
 from service.problems import stored_problem

@@ -6,10 +6,10 @@ from typing import Annotated, Any
 
 from pydantic import Field, model_validator
 
-from geometry.errors import ConflictError, NotFoundError
-from rig.session.records import CaptureId
-from rig.session.recovery import read_books
-from rig.session.storage import Disk
+from common.errors import ConflictError, NotFoundError
+from rig.acquisition.session.records import CaptureId
+from rig.acquisition.session.recovery import read_books
+from rig.acquisition.session.storage import Disk
 from service.api.context import Service
 from service.api.models import Model
 from service.api.picturesets import KIND as PICTURE_SET
@@ -71,7 +71,7 @@ class Detection(Model):
 def picture_source(service: Service, pictures: Pictures) -> tuple[JSON, tuple[JobInput, ...]]:
     """The part of a task's request, and its inputs, that name the pictures.
 
-    Raises :class:`NotFoundError` and :class:`~geometry.errors.InputError` for what is not there.
+    Raises :class:`NotFoundError` and :class:`~common.errors.InputError` for what is not there.
     """
     if pictures.picture_set_id is not None:
         found = service.store.documents.get(PICTURE_SET, pictures.picture_set_id)

@@ -8,7 +8,7 @@ from anyio import to_thread
 from fastapi import APIRouter, Query, Request, Response
 from pydantic import AwareDatetime, Field
 
-from geometry.errors import InputError, InternalError
+from common.errors import InputError, InternalError
 from service.api.context import Service, ServiceDep
 from service.api.models import Cursor, Limit, Model, problems
 from service.api.receiving import died, read_apart, receive

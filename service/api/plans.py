@@ -7,18 +7,12 @@ from typing import Annotated, Any, Literal
 from fastapi import APIRouter, Response
 from pydantic import Field
 
-from rig.mounts.systemfile import SystemFile, system_from_mapping
+from rig.build.mounts.systemfile import SystemFile, system_from_mapping
 from service.api.context import ServiceDep
 from service.api.designs import resource as designs
 from service.api.job_routes import JobResource
 from service.api.measuring import Id, completed, made_file
-from service.api.models import (
-    LARGEST_JSON_INTEGER,
-    IdempotencyKeyHeader,
-    Job,
-    Model,
-    problems,
-)
+from service.api.models import LARGEST_JSON_INTEGER, IdempotencyKeyHeader, Job, Model, problems
 from service.api.submission import submit
 from service.api.zipped import ZIP, zipped
 

@@ -10,7 +10,7 @@ from anyio import to_thread
 from fastapi import Request
 from starlette.requests import ClientDisconnect
 
-from geometry.errors import CancelledError, InputError, InternalError, TooLargeError
+from common.errors import CancelledError, InputError, InternalError, TooLargeError
 from service.api.context import Service
 from service.jobs.engine import JobKind, Task
 from service.store.blobs import StagedFile, Staging

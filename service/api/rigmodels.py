@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from rig.session.records import CaptureRecord, VerdictEntry
+from rig.acquisition.session.records import CaptureRecord, VerdictEntry
 from service.api.models import Model, Problem
 
 Identifier = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,63}$")]

@@ -8,10 +8,10 @@ from urllib.parse import quote
 
 from fastapi import APIRouter
 
-from geometry.errors import RigwrightError
-from rig.cameras.base import CameraHealth
-from rig.capture.results import RigHealth
-from rig.station.spec import CameraPlan
+from common.errors import RigwrightError
+from rig.acquisition.cameras.base import CameraHealth
+from rig.acquisition.capture.results import RigHealth
+from rig.acquisition.station.spec import CameraPlan
 from service.api.context import ServiceDep
 from service.api.models import problems
 from service.api.rigmodels import RigList, RigStatus

@@ -7,7 +7,7 @@ from typing import Literal
 
 from fastapi import APIRouter
 
-from rig.designfile import program_version
+from rig.design.designfile import program_version
 from service.api.context import ServiceDep
 from service.api.models import Model
 from service.store.tables import JobStatus

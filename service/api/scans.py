@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Query, Request, Response
 from pydantic import AwareDatetime, Field
 
-from rig.sections.subject import Axis
+from rig.specification.sections.subject import Axis
 from service.api.context import ServiceDep
 from service.api.models import Cursor, IdempotencyKeyHeader, Limit, Model, Note, problems
 from service.api.uploads import Upload, take_in

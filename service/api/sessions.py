@@ -9,11 +9,11 @@ from fastapi import APIRouter
 from fastapi.responses import FileResponse
 from pydantic import Field
 
-from geometry.errors import NotFoundError
-from rig.session.records import CaptureRecord, SessionFile
-from rig.session.recovery import read_books
-from rig.session.storage import Disk
-from rig.session.verify import verify_session
+from common.errors import NotFoundError
+from rig.acquisition.session.records import CaptureRecord, SessionFile
+from rig.acquisition.session.recovery import read_books
+from rig.acquisition.session.storage import Disk
+from rig.acquisition.session.verify import verify_session
 from service.api.context import ServiceDep
 from service.api.models import Model, problems
 

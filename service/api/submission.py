@@ -9,7 +9,7 @@ from typing import Any
 
 from fastapi import Response
 
-from rig.rigfile import RigFile, rig_from_mapping
+from rig.specification.rigfile import RigFile, rig_from_mapping
 from service.api.context import Service
 from service.api.job_routes import JobResource
 from service.store.idempotency import IdempotencyKey
@@ -20,7 +20,7 @@ from service.store.scans import ScanRecord
 def rig_for_scan(rig: RigFile, scan: ScanRecord, overrides: dict[str, Any]) -> dict[str, Any]:
     """The rig as JSON, with ``overrides``, and read with the scan's own options where it has none.
 
-    Raises :class:`~geometry.errors.InputError` when the whole makes no sense.
+    Raises :class:`~common.errors.InputError` when the whole makes no sense.
     """
     document = rig.model_dump(mode="json", by_alias=True, exclude_unset=True) | overrides
     asked = document.get("scan", {})

@@ -11,7 +11,7 @@ from pydantic import AwareDatetime, Field
 from calibration.targets.filekeys import TargetsModel
 from calibration.targets.files import read_targets, targets_of, targets_text
 from calibration.targets.kinds import TargetPlan
-from geometry.errors import NotFoundError
+from common.errors import NotFoundError
 from service.api.context import Service, ServiceDep
 from service.api.designs import resource as designs
 from service.api.models import Cursor, Limit, Model, problems

@@ -12,7 +12,7 @@ from typing import Any
 from anyio import CancelScope, to_thread
 from fastapi import Request
 
-from geometry.errors import InputError, InternalError, NotFoundError
+from common.errors import InputError, InternalError, NotFoundError
 from service.api.context import Service
 from service.api.receiving import died, read_apart, receive
 from service.jobs.engine import JobKind

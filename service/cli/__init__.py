@@ -46,7 +46,7 @@ WorkersOption = Annotated[
 
 def _print_version(wanted: bool) -> None:
     if wanted:
-        from rig.designfile import program_version
+        from rig.design.designfile import program_version
 
         typer.echo(f"rigwright {program_version()}")
         raise typer.Exit

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import typer
 
-from geometry.errors import InputError
-from rig.capture.devices import StationDevices
-from rig.station.spec import TriggerPlan
-from rig.station.stationfile import read_station
-from rig.trigger.box import TriggerBox, TriggerCapabilities, TriggerHealth
-from rig.trigger.fake.program import FakeOptions, run_fake
+from common.errors import InputError
+from rig.acquisition.capture.devices import StationDevices
+from rig.acquisition.station.spec import TriggerPlan
+from rig.acquisition.station.stationfile import read_station
+from rig.acquisition.trigger.box import TriggerBox, TriggerCapabilities, TriggerHealth
+from rig.acquisition.trigger.fake.program import FakeOptions, run_fake
 from service.cli.output import NOT_WELL, print_json
 from service.cli.running import one_line_errors
 

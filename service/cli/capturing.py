@@ -12,18 +12,18 @@ from typing import Any
 
 import typer
 
-from geometry.errors import NotFoundError
-from rig.capture.results import CaptureResult, SelfTest, SyncCheck
-from rig.capture.rig import Rig, open_station
-from rig.session.folder import Session, session_folder
-from rig.station.delays import write_timings
-from rig.station.stationfile import read_station
+from common.errors import NotFoundError
+from common.progress import Progress, ProgressCallback
+from rig.acquisition.capture.results import CaptureResult, SelfTest, SyncCheck
+from rig.acquisition.capture.rig import Rig, open_station
+from rig.acquisition.session.folder import Session, session_folder
+from rig.acquisition.station.delays import write_timings
+from rig.acquisition.station.stationfile import read_station
 from service.cli.output import NOT_WELL, print_json, show
 from service.cli.progress import show_progress
 from service.cli.running import cancel_on_signal, one_line_errors
 from service.rigs.orders import self_test_document, sync_document
 from service.wire import plain
-from solver.progress import Progress, ProgressCallback
 
 JSON = dict[str, Any]
 SESSIONS = Path("sessions")

@@ -6,10 +6,10 @@ import dataclasses
 import sys
 from pathlib import Path
 
-from geometry.errors import InputError
-from rig.cameras.registry import discover_all
-from rig.session.folder import Session
-from rig.session.verify import verify_session
+from common.errors import InputError
+from rig.acquisition.cameras.registry import discover_all
+from rig.acquisition.session.folder import Session
+from rig.acquisition.session.verify import verify_session
 from service.cli.output import print_json
 from service.cli.running import one_line_errors
 

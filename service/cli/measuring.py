@@ -13,7 +13,7 @@ from typing import Any
 
 import typer
 
-from geometry.errors import InputError
+from common.errors import InputError
 from service.cli.output import NOT_WELL, print_json
 from service.cli.running import new_folder, one_line_errors, run_task
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from geometry.exchange import FORMATS, ExportOptions, write_export
 from rig.catalogue import catalogue_entry, catalogue_rows, load_catalogue
-from rig.designfile import read_design
+from rig.design.designfile import read_design
 from service.cli.output import print_json
 from service.cli.running import one_line_errors
 

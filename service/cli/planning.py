@@ -10,7 +10,7 @@ from typing import Any
 
 import typer
 
-from geometry.errors import InputError
+from common.errors import InputError
 from service.cli.output import print_json
 from service.cli.running import new_folder, one_line_errors, run_task
 from service.problems import EXIT_INFEASIBLE

@@ -17,7 +17,7 @@ from typing import Any
 
 import typer
 
-from geometry.errors import ConflictError, InputError, InternalError, RigwrightError
+from common.errors import ConflictError, InputError, InternalError, RigwrightError
 from service.cli.progress import show_progress
 from service.jobs.engine import JobKind, Task
 from service.jobs.process import ProcessEngine

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from geometry.errors import InputError
+from common.errors import InputError
 from service.cli.output import print_json
 from service.cli.running import new_folder, one_line_errors, run_task
 

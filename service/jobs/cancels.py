@@ -40,7 +40,7 @@ class Cancels:
                 del self._events[job_id]
 
     def cancel(self, job_id: str, kind: str) -> JobRecord:
-        """Ask a job to stop. Raises :class:`~geometry.errors.ConflictError` if it has ended."""
+        """Ask a job to stop. Raises :class:`~common.errors.ConflictError` if it has ended."""
         record = self._store.jobs.request_cancel(job_id, kind)
         with self._lock:
             event = self._events.get(job_id)

@@ -20,9 +20,9 @@ import traceback
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from geometry.errors import CancelledError, InternalError, RigwrightError, TooLargeError
+from common.errors import CancelledError, InternalError, RigwrightError, TooLargeError
+from common.progress import Progress
 from service.wire import error_fields, line, plain
-from solver.progress import Progress
 
 _PROGRESS_INTERVAL_S = 0.2
 

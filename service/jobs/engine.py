@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
-from solver.progress import CancelToken
+from common.progress import CancelToken
 
 
 @dataclass(frozen=True)
@@ -51,9 +51,9 @@ class Engine(Protocol):
     def run(self, task: Task, report: Report, cancel: CancelToken) -> dict[str, Any]:
         """The task's result, a JSON object; returns only when nothing of the task runs any more.
 
-        Raises the :class:`~geometry.errors.RigwrightError` that the work raised,
-        :class:`~geometry.errors.CancelledError` when ``cancel`` ended it,
-        :class:`~geometry.errors.TooLargeError` when it went over its time or memory, and
-        :class:`~geometry.errors.InternalError` when it died.
+        Raises the :class:`~common.errors.RigwrightError` that the work raised,
+        :class:`~common.errors.CancelledError` when ``cancel`` ended it,
+        :class:`~common.errors.TooLargeError` when it went over its time or memory, and
+        :class:`~common.errors.InternalError` when it died.
         """
         ...

@@ -17,7 +17,7 @@ from typing import Any
 
 from sqlalchemy.exc import SQLAlchemyError
 
-from geometry.errors import CancelledError, InternalError, RigwrightError
+from common.errors import CancelledError, InternalError, RigwrightError
 from service import logs
 from service.jobs.bell import Bell
 from service.jobs.cancels import Cancels

@@ -14,11 +14,11 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, Any
 
-from geometry.errors import CancelledError, InternalError, RigwrightError, TooLargeError
+from common.errors import CancelledError, InternalError, RigwrightError, TooLargeError
+from common.progress import CancelToken
 from service.jobs.engine import Report, Task
 from service.logs import log
 from service.wire import error_from_fields, line
-from solver.progress import CancelToken
 
 _POLL_S = 0.05
 _ONE_THREAD = {

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from calibration.targets.proposing import Proposal, propose_targets
-from geometry.errors import InputError
-from rig.designfile import read_design
+from common.errors import InputError
+from rig.design.designfile import read_design
 from service.wire import plain
 
 JSON = dict[str, Any]

@@ -20,7 +20,7 @@ from calibration.targets.kinds import (
     TargetPlan,
 )
 from calibration.targets.printing import carrier_drawings, to_pdf, to_svg
-from geometry.errors import InputError
+from common.errors import InputError
 from service.store.scans import plain_name
 
 

@@ -15,7 +15,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 
-from geometry.errors import InputError, TooLargeError
+from common.errors import InputError, TooLargeError
 from service.pictures.listing import LAYOUT, is_picture
 
 MOST_PICTURES = 20_000

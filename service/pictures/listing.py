@@ -11,10 +11,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
-from geometry.errors import InputError, NotFoundError
-from rig.cameras.base import FrameStatus
-from rig.session.recovery import read_books
-from rig.session.storage import Disk
+from common.errors import InputError, NotFoundError
+from rig.acquisition.cameras.base import FrameStatus
+from rig.acquisition.session.recovery import read_books
+from rig.acquisition.session.storage import Disk
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm", ".webp")
 LAYOUT = "put each camera's pictures into a folder of its name, as in cam01/0001.png"

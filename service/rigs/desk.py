@@ -10,17 +10,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from geometry.errors import (
-    ConflictError,
-    DeviceError,
-    InterlockError,
-    InternalError,
-    RigwrightError,
-)
-from rig.capture.results import RigHealth
-from rig.capture.rig import Rig, open_station
-from rig.station.spec import Station
-from rig.trigger.box import TriggerState
+from common.errors import ConflictError, DeviceError, InterlockError, InternalError, RigwrightError
+from common.progress import CancelToken, Progress, ProgressCallback
+from rig.acquisition.capture.results import RigHealth
+from rig.acquisition.capture.rig import Rig, open_station
+from rig.acquisition.station.spec import Station
+from rig.acquisition.trigger.box import TriggerState
 from service import logs
 from service.jobs.bell import Bell
 from service.jobs.cancels import Cancels
@@ -29,7 +24,6 @@ from service.rigs.sessions import Sessions
 from service.store import Store
 from service.store.jobrecords import JobRecord, NewJob
 from service.wire import plain
-from solver.progress import CancelToken, Progress, ProgressCallback
 
 JSON = dict[str, Any]
 Work = Callable[[Rig, Sessions, ProgressCallback, CancelToken], JSON]

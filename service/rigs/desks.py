@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from geometry.errors import ConflictError, InputError, NotFoundError, RigwrightError
-from rig.capture.results import CaptureResult
-from rig.session.folder import Session
-from rig.station.spec import Station
-from rig.station.stationfile import read_station
+from common.errors import ConflictError, InputError, NotFoundError, RigwrightError
+from rig.acquisition.capture.results import CaptureResult
+from rig.acquisition.session.folder import Session
+from rig.acquisition.station.spec import Station
+from rig.acquisition.station.stationfile import read_station
 from service.rigs.desk import Books, RigDesk
 from service.rigs.orders import CAPTURE, RIG_KINDS, capture_document, session_name
 from service.store import interrupted

@@ -5,12 +5,12 @@ from __future__ import annotations
 import dataclasses
 from typing import Any
 
-from rig.capture.results import CaptureResult, SelfTest, SyncCheck
-from rig.capture.rig import Rig
-from rig.station.delays import write_timings
+from common.progress import CancelToken, ProgressCallback
+from rig.acquisition.capture.results import CaptureResult, SelfTest, SyncCheck
+from rig.acquisition.capture.rig import Rig
+from rig.acquisition.station.delays import write_timings
 from service.rigs.desk import Work
 from service.rigs.sessions import Sessions
-from solver.progress import CancelToken, ProgressCallback
 
 JSON = dict[str, Any]
 CAPTURE, TEST = "capture", "rig-test"

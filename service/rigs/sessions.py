@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from geometry.errors import NotFoundError
-from rig.capture.rig import Rig
-from rig.session.folder import Session
+from common.errors import NotFoundError
+from rig.acquisition.capture.rig import Rig
+from rig.acquisition.session.folder import Session
 
 
 class Sessions:

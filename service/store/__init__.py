@@ -14,7 +14,7 @@ from alembic.util import CommandError
 from sqlalchemy import Connection, insert, select
 from sqlalchemy.exc import DatabaseError
 
-from geometry.errors import InputError, InternalError
+from common.errors import InputError, InternalError
 from service.store import idempotency
 from service.store.blobs import Blobs, known_files
 from service.store.database import Database
@@ -37,7 +37,7 @@ class Store:
     """A folder with everything the service must not forget.
 
     Opening it takes the folder's lock, brings the schema up to date and puts right what a crash
-    has left. Raises :class:`~geometry.errors.ConflictError` when another service has it open,
+    has left. Raises :class:`~common.errors.ConflictError` when another service has it open,
     :class:`InputError` when the folder cannot be used. Jobs of the kinds in ``settled_elsewhere``
     that ran at a crash are left as they are.
     """

@@ -15,7 +15,7 @@ from typing import Any, TypeVar
 
 from sqlalchemy import Connection, Engine, create_engine, event
 
-from geometry.errors import InternalError
+from common.errors import InternalError
 
 T = TypeVar("T")
 

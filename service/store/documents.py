@@ -9,7 +9,7 @@ from typing import Any
 
 from sqlalchemy import Connection, RowMapping, delete, insert, select
 
-from geometry.errors import NotFoundError
+from common.errors import NotFoundError
 from service.store.blobs import Blobs, StagedFile
 from service.store.database import Database
 from service.store.jobrecords import JobInput

@@ -13,7 +13,7 @@ from typing import Any
 
 from sqlalchemy import Connection, delete, insert, select, update
 
-from geometry.errors import ConflictError, InputError
+from common.errors import ConflictError, InputError
 from service.store.tables import idempotency, utc_now
 
 KEPT_DAYS = 7

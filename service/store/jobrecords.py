@@ -8,7 +8,7 @@ from typing import Any
 
 from sqlalchemy import Connection, RowMapping, func, insert, select, update
 
-from geometry.errors import NotFoundError
+from common.errors import NotFoundError
 from service.store.tables import JobStatus, job_events, jobs, utc_now
 
 JSON = dict[str, Any]

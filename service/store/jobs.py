@@ -12,7 +12,7 @@ from pathlib import Path
 
 from sqlalchemy import Connection, delete, exists, func, insert, select, update
 
-from geometry.errors import ConflictError, NotFoundError
+from common.errors import ConflictError, NotFoundError
 from service.store import idempotency
 from service.store.blobs import Blobs, StagedFile
 from service.store.database import Database

@@ -6,7 +6,7 @@ import fcntl
 import os
 from pathlib import Path
 
-from geometry.errors import ConflictError
+from common.errors import ConflictError
 
 
 class FolderLock:

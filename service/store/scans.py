@@ -12,7 +12,7 @@ from typing import Any
 
 from sqlalchemy import Connection, RowMapping, delete, exists, insert, select
 
-from geometry.errors import ConflictError, NotFoundError
+from common.errors import ConflictError, NotFoundError
 from service.store.blobs import Blobs, StagedFile
 from service.store.database import Database
 from service.store.idempotency import IdempotencyKey, answer

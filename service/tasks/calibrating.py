@@ -26,11 +26,11 @@ from calibration.files import (
 )
 from calibration.report import calibration_page, check_page, history_of, history_page
 from calibration.targets.files import read_targets
-from geometry.errors import InputError
-from rig.designfile import read_design
+from common.errors import InputError
+from common.progress import CancelToken, Progress, ProgressCallback
+from rig.design.designfile import read_design
 from service.measuring.figures import acceptance_figures, calibration_figures, check_figures
 from service.measuring.seeing import DETECTING, see, seen_figures
-from solver.progress import CancelToken, Progress, ProgressCallback
 
 JSON = dict[str, Any]
 Request = Mapping[str, Any]

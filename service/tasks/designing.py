@@ -8,15 +8,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from common.progress import CancelToken, Progress, ProgressCallback
 from geometry.camera import RigCamera
 from geometry.head import synthetic_head
-from rig.designfile import design_from_mapping, read_design
-from rig.examples import example_text
-from rig.rigfile import parse_rig, read_rig, rig_from_mapping
-from rig.spec import RigSpec
-from rig.station.examples import example_station_text
+from rig.acquisition.station.examples import example_station_text
+from rig.design.designfile import design_from_mapping, read_design
+from rig.specification.examples import example_text
+from rig.specification.rigfile import parse_rig, read_rig, rig_from_mapping
+from rig.specification.spec import RigSpec
 from service import work
-from solver.progress import CancelToken, Progress, ProgressCallback
 
 JSON = dict[str, Any]
 Request = Mapping[str, Any]

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from common.progress import CancelToken, ProgressCallback
 from service.pictures.archive import archive_facts
-from solver.progress import CancelToken, ProgressCallback
 
 
 def import_pictures(

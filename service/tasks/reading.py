@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from common.progress import CancelToken, ProgressCallback
 from geometry.reading import read_scan
-from rig.sections.subject import ScanSection
-from solver.progress import CancelToken, ProgressCallback
+from rig.specification.sections.subject import ScanSection
 
 
 def import_scan(

@@ -8,10 +8,10 @@ from typing import Any
 
 from calibration.targets.files import read_targets, write_targets
 from calibration.targets.kinds import CharucoPlate, MarkerCarrier, RingCarrier, TargetPlan
-from geometry.errors import CancelledError
+from common.errors import CancelledError
+from common.progress import CancelToken, Progress, ProgressCallback
 from service.measuring.proposing import proposal_figures, proposal_for
 from service.measuring.sheets import sheets_of
-from solver.progress import CancelToken, Progress, ProgressCallback
 
 JSON = dict[str, Any]
 

@@ -13,8 +13,8 @@ from calibration.acceptance.certificate import Heading
 from calibration.adjustment.start.resection import Placed
 from calibration.observations import Carrier, TargetSet
 from calibration.synthetic import Scene
+from common.errors import InputError
 from geometry.arrays import Floats
-from geometry.errors import InputError
 
 PLACES_MM = np.array([0.0, 60.0, 120.0, 190.0, 260.0, 330.0])
 WAYS = np.array(

@@ -25,9 +25,9 @@ from calibration.adjustment.reliability import DELTA0, reliability
 from calibration.adjustment.start.finding import find_start
 from calibration.adjustment.state import State
 from calibration.observations import Observations
+from common.errors import CancelledError
+from common.progress import Progress
 from geometry.arrays import Floats
-from geometry.errors import CancelledError
-from solver.progress import Progress
 
 SCENE = calibrations.small_scene()
 

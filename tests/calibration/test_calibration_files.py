@@ -12,7 +12,6 @@ import pytest
 
 from calibration.acceptance import Acceptance, LengthLimit, MeasuredLength, Outcome, Volume
 from calibration.check import check
-from calibration.edge.strict import plain
 from calibration.files import (
     ACCEPTANCES,
     CHECKS,
@@ -25,7 +24,8 @@ from calibration.files import (
     write_calibration,
 )
 from calibration.files.packing import compact
-from geometry.errors import ConflictError, InputError
+from common.errors import ConflictError, InputError
+from common.files.records import plain
 
 
 def record(name: str = "rig") -> CalibrationRecord:

@@ -13,7 +13,7 @@ from calibration.adjustment import CalibrationOptions, InteriorModel, ReferenceP
 from calibration.adjustment.start.resection import Placed
 from calibration.observations import Carrier, Distance, Observations, TargetSet
 from calibration.synthetic import Scene, face_rig, plate, plate_places, stand
-from geometry.errors import InputError
+from common.errors import InputError
 from geometry.frames import Pose
 
 SCENE = calibrations.small_scene()

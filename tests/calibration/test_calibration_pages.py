@@ -12,13 +12,7 @@ import pytest
 
 from calibration.check import CheckOptions, CheckResult, check
 from calibration.files import CalibrationRecord, CheckRecord
-from calibration.report import (
-    calibration_page,
-    check_page,
-    history_of,
-    history_page,
-    history_svg,
-)
+from calibration.report import calibration_page, check_page, history_of, history_page, history_svg
 
 NASTY = '<script>alert("x")</script>'
 

@@ -19,7 +19,7 @@ from calibration.check.gross import put_right
 from calibration.check.hypotheses import Cause
 from calibration.observations import Carrier, TargetSet
 from calibration.synthetic import Scene, face_rig, face_scene, plate_places
-from geometry.errors import CancelledError, InputError
+from common.errors import CancelledError, InputError
 from geometry.frames import Pose
 
 SCENE = calibrations.check_scene()

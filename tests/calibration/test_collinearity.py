@@ -135,7 +135,7 @@ def test_camera_objects_and_rows_project_alike() -> None:
 
 
 def test_a_camera_of_impossible_values_is_refused() -> None:
-    from geometry.errors import InputError
+    from common.errors import InputError
 
     for f, centre, terms in (
         (0.0, [1, 1], [0] * 5),

@@ -18,8 +18,8 @@ from calibration.detection.gates import Gates
 from calibration.detection.images import decoded, picture_from, read_picture
 from calibration.detection.pictures import DetectionJob, TakenPicture, detect_pictures
 from calibration.targets.kinds import TargetPlan
-from geometry.errors import CancelledError, InputError
-from solver.progress import Progress
+from common.errors import CancelledError, InputError
+from common.progress import Progress
 
 PLAN = TargetPlan("set", (scenes.PLATE,))
 

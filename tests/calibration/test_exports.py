@@ -11,7 +11,7 @@ import pytest
 from calibration.adjustment.camera import CalibratedCamera, Interior
 from calibration.exports import FULL_FRAME_MM, rig_cameras
 from calibration.synthetic import PIXEL_PITCH_MM, face_rig
-from geometry.errors import InputError
+from common.errors import InputError
 from geometry.exchange import write_export
 
 POINTS_MM = np.random.default_rng(1).uniform(-80.0, 80.0, (40, 3))

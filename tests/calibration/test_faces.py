@@ -16,7 +16,7 @@ from calibration.targets.kinds import (
     RingCarrier,
     TargetPlan,
 )
-from geometry.errors import InputError
+from common.errors import InputError
 
 GRID = [(x, y, 0.0) for y in (0.0, 40.0) for x in (0.0, 45.0, 90.0)]
 EXACT = (0.0, 0.0, 0.0)

@@ -9,12 +9,12 @@ import pytest
 import rigs
 
 from calibration.intersection import intersect
+from common.errors import InputError
 from geometry.camera import RigCamera
-from geometry.errors import InputError
 from geometry.frames import Pose
 from solver.limits import Coverage
+from solver.problem import Scene
 from solver.quality import Sightings, evaluate
-from solver.scene import Scene
 
 DRAWS = 2000
 SIGMA_PX = 0.5

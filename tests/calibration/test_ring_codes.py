@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from calibration.targets.ringcodes import RingCodeFamily, canonical, mirrored, rotations
-from geometry.errors import InputError
+from common.errors import InputError
 
 FAMILIES = {bits: RingCodeFamily(bits) for bits in (12, 14)}
 codes = st.sampled_from([12, 14]).flatmap(

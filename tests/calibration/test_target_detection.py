@@ -13,8 +13,8 @@ from calibration.detection.gates import Gates, Rule
 from calibration.detection.selftest import check_opencv
 from calibration.detection.selftest import opencv as shim
 from calibration.targets.kinds import CarrierKind, CharucoPlate, TargetPlan
+from common.errors import DeviceError, InputError
 from geometry.arrays import Floats, Ints
-from geometry.errors import DeviceError, InputError
 
 KINDS: tuple[CarrierKind, ...] = (
     scenes.PLATE,

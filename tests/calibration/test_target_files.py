@@ -20,7 +20,7 @@ from calibration.targets.kinds import (
 )
 from calibration.targets.ringcodes import RingCodeFamily
 from calibration.targets.sheets import marker_sheet, ring_sheet, scale_bar
-from geometry.errors import ConflictError, InputError
+from common.errors import ConflictError, InputError
 
 lengths = st.floats(-500.0, 500.0)
 sigmas = st.one_of(st.floats(0.0, 10.0), st.just(float("inf")))

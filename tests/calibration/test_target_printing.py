@@ -18,8 +18,8 @@ from calibration.targets.kinds import (
 )
 from calibration.targets.printing import carrier_drawings, page_size, to_pdf, to_svg
 from calibration.targets.sheets import marker_sheet, ring_sheet, scale_bar
+from common.errors import InputError
 from geometry.arrays import Floats
-from geometry.errors import InputError
 
 pypdfium2 = pytest.importorskip("pypdfium2")
 

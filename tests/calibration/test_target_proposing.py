@@ -9,8 +9,8 @@ import rigs
 from calibration.targets.files import targets_from, targets_text
 from calibration.targets.kinds import CharucoPlate, RingCarrier
 from calibration.targets.proposing import DOT_RADIUS_PX, LARGEST_DOT_PX, propose_targets
+from common.errors import InputError
 from geometry.camera import RigCamera
-from geometry.errors import InputError
 from geometry.frames import Pose
 
 FACE = np.array([160.0, 140.0, 220.0])

@@ -15,7 +15,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scanfiles import plain_head
 
-from geometry.errors import InputError, NotFoundError, RigwrightError, TooLargeError
+from common.errors import InputError, NotFoundError, RigwrightError, TooLargeError
 from geometry.reading import ScanOptions, read_scan
 from geometry.scan import Scan
 from geometry.sniffing import KINDS

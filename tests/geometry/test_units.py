@@ -10,8 +10,8 @@ import pytest
 import trimesh
 from scanfiles import plain_head, real_head_path
 
+from common.errors import InputError
 from geometry.axes import DIRECTIONS, Axes, infer_axes, surface_samples
-from geometry.errors import InputError
 from geometry.head import synthetic_head
 from geometry.reading import ScanOptions, read_scan
 from geometry.scan import Scan

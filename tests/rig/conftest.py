@@ -15,14 +15,9 @@ from geometry.frames import Pose
 from geometry.head import synthetic_head
 from geometry.preparation import PreparedSubject, SubjectOptions, prepare_subject
 from geometry.subject import Subject
-from rig.examples import example_rig
+from rig.specification.examples import example_rig
 from solver.quality import evaluate
-from solver.result import (
-    Design,
-    SolverReport,
-    StartReport,
-    Status,
-)
+from solver.result import Design, SolverReport, StartReport, Status
 
 REPO = Path(__file__).resolve().parents[2]
 

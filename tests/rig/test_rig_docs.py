@@ -10,20 +10,22 @@ import jsonschema
 import pytest
 from plans import plate_plan
 
+from rig.acquisition.station.stationfile import StationFile, parse_station
+from rig.build.mounts.planfile import plan_document
 from rig.catalogue.model import CatalogueFile
-from rig.designfile import design_document
-from rig.designmodel import DesignFile
-from rig.examples import example_rig, example_text
-from rig.mounts.planfile import plan_document
-from rig.rigfile import RigFile, parse_rig
-from rig.schemas import documents, keys, main
-from rig.station.stationfile import StationFile, parse_station
+from rig.design.designfile import design_document
+from rig.design.designmodel import DesignFile
+from rig.specification.examples import example_rig, example_text
+from rig.specification.rigfile import RigFile, parse_rig
+from service.reference.schemas import documents, keys, main
 from solver.result import Design
 
 
 def test_generated_documents_are_up_to_date(repo: Path) -> None:
     for path, text in documents(repo / "docs").items():
-        assert path.read_text(encoding="utf-8") == text, f"run: python -m rig.schemas ({path.name})"
+        assert path.read_text(encoding="utf-8") == text, (
+            f"run: python -m service.reference.schemas ({path.name})"
+        )
 
 
 def test_the_command_writes_them(repo: Path, tmp_path: Path) -> None:

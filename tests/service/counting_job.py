@@ -13,9 +13,9 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from geometry.errors import CancelledError, InputError
+from common.errors import CancelledError, InputError
+from common.progress import CancelToken, Progress
 from service.jobs.engine import JobKind
-from solver.progress import CancelToken, Progress
 
 COUNT = JobKind("count", "counting_job:count")
 KINDS = {

@@ -13,7 +13,7 @@ from scanfiles import plain_head
 from service_helpers import files_under, one_line_and_nothing_left
 from starlette.testclient import TestClient
 
-from rig.examples import example_text
+from rig.specification.examples import example_text
 from service.api.context import Service
 
 RIG = "rig.toml"

@@ -25,9 +25,9 @@ from service_helpers import (
 )
 from starlette.testclient import TestClient
 
-from geometry.errors import ConflictError
-from rig.designfile import placed_camera
-from rig.session.folder import Session, SessionPlan
+from common.errors import ConflictError
+from rig.acquisition.session.folder import Session, SessionPlan
+from rig.design.designfile import placed_camera
 from service.api.app import create_app
 from service.api.context import Service
 from service.kinds import KINDS

@@ -27,8 +27,8 @@ from starlette.testclient import TestClient
 from geometry.camera import RigCamera
 from geometry.frames import Pose
 from geometry.head import synthetic_head
-from rig.designfile import placed_camera
-from rig.examples import example_text
+from rig.design.designfile import placed_camera
+from rig.specification.examples import example_text
 from service import work
 from service.api.app import create_app
 from service.api.context import Service

@@ -19,7 +19,7 @@ from geometry.camera import RigCamera
 from geometry.frames import Pose, look_at_rotation
 from geometry.preparation import SubjectOptions, prepare_subject
 from geometry.reading import read_scan
-from rig.designfile import placed_camera
+from rig.design.designfile import placed_camera
 from service.api.app import create_app
 from service.api.context import Service
 from service.kinds import KINDS

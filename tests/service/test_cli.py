@@ -16,7 +16,7 @@ import pytest
 import typer
 from service_helpers import HERE, RIGWRIGHT, files_under, rigwright, wait_for
 
-from geometry.errors import CancelledError, ConflictError, InputError
+from common.errors import CancelledError, ConflictError, InputError
 from service.cli.running import new_folder, one_line_errors, run_task
 
 

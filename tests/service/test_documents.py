@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from service_helpers import files_under
 
-from geometry.errors import NotFoundError
+from common.errors import NotFoundError
 from service.store import Store
 from service.store.documents import DocumentRecord
 from service.store.jobrecords import JobInput, NewJob

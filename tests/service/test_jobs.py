@@ -12,7 +12,8 @@ import counting_job
 import pytest
 from service_helpers import HERE, ROOT, alive, ended, files_under, wait_for
 
-from geometry.errors import CancelledError, ConflictError, InputError, InternalError, TooLargeError
+from common.errors import CancelledError, ConflictError, InputError, InternalError, TooLargeError
+from common.progress import CancelToken, NeverCancelled
 from service.jobs.bell import Bell
 from service.jobs.cancels import Cancels
 from service.jobs.engine import Task
@@ -21,7 +22,6 @@ from service.jobs.process import ProcessEngine
 from service.store import Store
 from service.store.jobrecords import NewJob
 from service.store.tables import JobStatus
-from solver.progress import CancelToken, NeverCancelled
 
 ENGINE = ProcessEngine(cancel_grace_s=0.5)
 
@@ -116,7 +116,7 @@ class TestProcessEngine:
             "from pathlib import Path\n"
             "from service.jobs.engine import Task\n"
             "from service.jobs.process import ProcessEngine\n"
-            "from solver.progress import CancelToken, NeverCancelled\n"
+            "from common.progress import CancelToken, NeverCancelled\n"
             f"task = Task(counting_job.COUNT, {{'to': 100000, 'mark': 1}}, "
             f"Path({str(tmp_path / mark)!r}))\n"
             "ProcessEngine().run(task, lambda p: print(p['start'], flush=True), NeverCancelled())\n"

@@ -20,7 +20,7 @@ from starlette.testclient import TestClient
 from calibration.targets.files import targets_text
 from calibration.targets.kinds import Place, RingCarrier, TargetPlan
 from geometry.arrays import Floats
-from rig.designfile import placed_camera
+from rig.design.designfile import placed_camera
 from service.api.app import create_app
 from service.api.context import Service
 from service.kinds import KINDS

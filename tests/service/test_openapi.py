@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from service_helpers import ROOT, StartServer
 
-from rig.sections.subject import ScanSection
+from rig.specification.sections.subject import ScanSection
 from service.api.app import make_app
 
 DOCUMENT: dict[str, Any] = make_app().openapi()
@@ -54,7 +54,9 @@ def test_a_contract_fuzzer_finds_no_fault_in_long(
 
 def test_the_committed_document_is_that_of_the_code() -> None:
     committed = json.loads((ROOT / "docs" / "openapi.json").read_text(encoding="utf-8"))
-    assert committed == DOCUMENT, "write it again: python -m service.api.document docs/openapi.json"
+    assert committed == DOCUMENT, (
+        "write it again: python -m service.reference.openapi docs/openapi.json"
+    )
 
 
 def operations() -> list[tuple[str, str, dict[str, Any]]]:

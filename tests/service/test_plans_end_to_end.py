@@ -16,8 +16,8 @@ from service_helpers import files_under, rigwright, small_rig_text, wait_for
 from starlette.testclient import TestClient
 
 from geometry.head import synthetic_head
-from rig.designfile import design_from_mapping
-from rig.mounts.planfile import plan_from_mapping, read_plan
+from rig.build.mounts.planfile import plan_from_mapping, read_plan
+from rig.design.designfile import design_from_mapping
 from service import work
 from service.api.app import create_app
 from service.api.context import Service

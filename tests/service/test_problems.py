@@ -9,7 +9,7 @@ import pytest
 from service_helpers import ROOT
 from starlette.testclient import TestClient
 
-from geometry import errors
+from common import errors
 from service.api import picturesets, targetsets
 from service.api.app import make_app
 from service.kinds import KINDS as JOB_KINDS

@@ -12,8 +12,8 @@ import pytest
 from service_helpers import RIGWRIGHT, rigwright, wait_for
 from stations import write_station
 
-from rig.station.stationfile import read_station
-from rig.trigger.fake.program import FakeTrigger, start_fake
+from rig.acquisition.station.stationfile import read_station
+from rig.acquisition.trigger.fake.program import FakeTrigger, start_fake
 
 COMMANDS = (
     ["capture"],

@@ -13,7 +13,7 @@ from service_helpers import files_under
 from sqlalchemy import insert, text, update
 from sqlalchemy.exc import IntegrityError
 
-from geometry.errors import ConflictError, InputError, InternalError, NotFoundError
+from common.errors import ConflictError, InputError, InternalError, NotFoundError
 from service.store import Store, idempotency
 from service.store.idempotency import IdempotencyKey
 from service.store.jobrecords import NewJob

@@ -17,7 +17,7 @@ from solver.constraints.places import (
 )
 from solver.constraints.rays import FocusRays, MeanAxisIncidence, MeanImageCoordinate, RayPlanes
 from solver.information import CovarianceCost
-from solver.scene import Scene
+from solver.problem import Scene
 
 CAMERAS = 4
 UNKNOWNS = 7 * CAMERAS

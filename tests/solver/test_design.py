@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 import rigs
 
-from geometry.errors import CancelledError, InputError
+from common.errors import CancelledError, InputError
+from common.progress import Progress
 from geometry.frames import Pose
 from solver.design import best_strip, design
 from solver.limits import (
@@ -27,10 +28,9 @@ from solver.limits import (
     Symmetry,
     Zones,
 )
-from solver.progress import Progress
+from solver.problem import camera_at
 from solver.quality import evaluate
 from solver.result import Design, Status
-from solver.scene import camera_at
 
 
 @cache

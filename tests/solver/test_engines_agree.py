@@ -9,13 +9,13 @@ import pytest
 import rigs
 
 from benchmarks.engines import solve_ipopt, solve_slsqp
-from solver.coverage import views
+from solver.coverage.visibilitycuts import views
 from solver.limits import Coverage, MotionBox
-from solver.programme import Programme
-from solver.rounds import all_candidates, covariance_cost, unknown_bounds
-from solver.scene import Scene
-from solver.sqp import minimise
-from solver.sqpstate import Task
+from solver.nlp.iterate import Task
+from solver.nlp.program import Programme
+from solver.nlp.sqp import minimise
+from solver.outerloop import all_candidates, covariance_cost, unknown_bounds
+from solver.problem import Scene
 
 # The promise of agreement in docs/decisions: one part in a thousand of the cost.
 AGREE = 1e-3

@@ -8,7 +8,7 @@ import rigs
 
 from benchmarks.oracle import cost_expression
 from solver.information import CovarianceCost
-from solver.scene import Scene
+from solver.problem import Scene
 
 
 def test_cost_gradient_and_hessian_agree_with_automatic_differentiation() -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 from simulated_rigs import lens, placed
 
 from geometry.camera import RigCamera
-from rig.designfile import placed_camera
+from rig.design.designfile import placed_camera
 
 PLATE = {
     "name": "plate",

@@ -25,7 +25,7 @@ import cv2
 import numpy as np
 import pytest
 
-from rig.cameras.base import (
+from rig.acquisition.cameras.base import (
     ArmSpec,
     CameraBackend,
     CameraDevice,
@@ -33,8 +33,8 @@ from rig.cameras.base import (
     Frame,
     TriggerKind,
 )
-from rig.cameras.registry import make_backend
-from rig.cameras.remotecamera import RemoteCamera
+from rig.acquisition.cameras.registry import make_backend
+from rig.acquisition.cameras.remotecamera import RemoteCamera
 
 FAKE_GV = "arv-fake-gv-camera-0.8"
 LIFE_S = 240

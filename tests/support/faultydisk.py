@@ -7,7 +7,7 @@ import threading
 import time
 from pathlib import Path
 
-from rig.session.storage import Disk
+from rig.acquisition.session.storage import Disk
 
 
 class PowerCut(BaseException):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from firmware_sim import FirmwareSim, Reset
 
-from rig.trigger.conformance import Hands
+from rig.acquisition.trigger.conformance import Hands
 
 _PATIENCE_MS = 1.0
 

@@ -8,10 +8,10 @@ from pathlib import Path
 
 from memoryrig import BoxScript, CameraScript, MemoryBox, MemoryDevices, line_fit, memory_station
 
-from rig.capture.rig import Rig, open_station
-from rig.session.folder import Session
-from rig.session.storage import Disk
-from rig.station.spec import Station
+from rig.acquisition.capture.rig import Rig, open_station
+from rig.acquisition.session.folder import Session
+from rig.acquisition.session.storage import Disk
+from rig.acquisition.station.spec import Station
 
 
 @dataclass

@@ -14,8 +14,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from geometry.errors import ConflictError, DeviceError, InterlockError
-from rig.cameras.base import (
+from common.errors import ConflictError, DeviceError, InterlockError
+from rig.acquisition.cameras.base import (
     ArmSpec,
     CameraCapabilities,
     CameraHealth,
@@ -27,8 +27,8 @@ from rig.cameras.base import (
     TimestampKind,
     TriggerKind,
 )
-from rig.station.spec import CameraPlan, CapturePolicy, Station, TriggerPlan
-from rig.trigger.box import (
+from rig.acquisition.station.spec import CameraPlan, CapturePolicy, Station, TriggerPlan
+from rig.acquisition.trigger.box import (
     ArmRequest,
     Edge,
     FireReport,
@@ -57,7 +57,7 @@ class BoxScript:
 
 
 class MemoryBox:
-    """A :class:`~rig.trigger.box.TriggerBox`; its edges reach the cameras wired to it at once."""
+    """A :class:`TriggerBox`; its edges reach the cameras wired to it at once."""
 
     def __init__(self, script: BoxScript = BoxScript()) -> None:
         self.script = script
@@ -209,7 +209,7 @@ class CameraScript:
 
 
 class MemoryCamera:
-    """A :class:`~rig.cameras.base.CameraDevice` with a clock and a counter of its own."""
+    """A :class:`CameraDevice` with a clock and a counter of its own."""
 
     def __init__(self, info: CameraInfo, script: CameraScript, seed: int) -> None:
         self.script = script
@@ -402,7 +402,7 @@ class MemoryBackend:
 
 @dataclass
 class MemoryDevices:
-    """A :class:`~rig.capture.devices.DeviceMaker` of all that is in this module."""
+    """A :class:`~rig.acquisition.capture.devices.DeviceMaker` of all that is in this module."""
 
     scripts: Mapping[str, CameraScript] = field(default_factory=dict)
     box: MemoryBox = field(default_factory=MemoryBox)

@@ -8,11 +8,8 @@ import numpy as np
 
 from geometry.camera import Body, Camera, RigCamera
 from geometry.frames import Pose
-from rig.bodies import place_body
-from rig.brackets import wedge_corners_mm
-from rig.convex import box_corners
-from rig.mounts.plan import Figures, MountPlan, Price, Tolerance
-from rig.mounts.settings import (
+from rig.build.mounts.plan import Figures, MountPlan, Price, Tolerance
+from rig.build.mounts.settings import (
     CameraMount,
     Link,
     Motion,
@@ -23,7 +20,19 @@ from rig.mounts.settings import (
     shift,
     turn,
 )
-from rig.mounts.structure import Hole, Joint, Member, PlacedPart, Plate, Solid, Structure, Wedge
+from rig.build.mounts.structure import (
+    Hole,
+    Joint,
+    Member,
+    PlacedPart,
+    Plate,
+    Solid,
+    Structure,
+    Wedge,
+)
+from rig.build.wedges import wedge_corners_mm
+from rig.solids.bodies import place_body
+from rig.solids.convex import box_corners
 
 KIND = Camera(
     "basler-aca2500-14u canon-ef-50-f14",

@@ -20,7 +20,7 @@ from solver.limits import (
     PoseBounds,
     StandOff,
 )
-from solver.scene import camera_at
+from solver.problem import camera_at
 from solver.starts import kmeans_start
 
 SEMI_AXES_MM = np.array([75.0, 95.0, 105.0])

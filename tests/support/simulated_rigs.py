@@ -6,7 +6,7 @@ import numpy as np
 
 from geometry.camera import Body, Camera, RigCamera
 from geometry.frames import Pose
-from rig.trigger.box import Edge, FireReport, Outcome
+from rig.acquisition.trigger.box import Edge, FireReport, Outcome
 
 NONE = (0.0, 0.0, 0.0, 0.0, 0.0)
 STRONG = (-0.28, 0.11, 0.002, -0.003, -0.02)

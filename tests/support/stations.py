@@ -10,7 +10,7 @@ from rigs import compact_camera, names
 
 from geometry.camera import RigCamera
 from geometry.frames import Pose, look_at_rotation
-from rig.designfile import placed_camera
+from rig.design.designfile import placed_camera
 
 
 def write_station(

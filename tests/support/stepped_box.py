@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from rig.trigger.conformance import Hands
-from rig.trigger.fake.device import FakeBox, FakeSettings
-from rig.trigger.fake.line import FakeLine
+from rig.acquisition.trigger.conformance import Hands
+from rig.acquisition.trigger.fake.device import FakeBox, FakeSettings
+from rig.acquisition.trigger.fake.line import FakeLine
 
 
 class SteppedBox:

@@ -12,11 +12,11 @@ from pathlib import Path
 
 import pytest
 
-from geometry.errors import RigwrightError
-from rig.trigger.box import ArmRequest, Outcome, Pulse, TriggerState
-from rig.trigger.driver import BoxAddress, SerialTriggerBox
-from rig.trigger.fake.device import FakeSettings
-from rig.trigger.fake.program import FakeTrigger, start_fake
+from common.errors import RigwrightError
+from rig.acquisition.trigger.box import ArmRequest, Outcome, Pulse, TriggerState
+from rig.acquisition.trigger.driver import BoxAddress, SerialTriggerBox
+from rig.acquisition.trigger.fake.device import FakeSettings
+from rig.acquisition.trigger.fake.program import FakeTrigger, start_fake
 
 ONE_EACH = {1: 1, 2: 1, 13: 1}
 """The pulses of one shot of :func:`request_for`."""

@@ -20,8 +20,8 @@ from calibration.adjustment.start.resection import Placed
 from calibration.adjustment.start.sizes import knows_size, size_of
 from calibration.adjustment.start.views import Placements, View, nominal_points, views_of
 from calibration.observations import Observations
+from common.errors import InputError
 from geometry.arrays import Floats
-from geometry.errors import InputError
 from geometry.frames import Pose
 
 NEAR_SHARE = 0.02

@@ -10,8 +10,8 @@ from calibration.adjustment.finite import finite_rows
 from calibration.adjustment.start.resection import interior_from_planes
 from calibration.adjustment.start.views import View, is_planar
 from calibration.observations import Observations
+from common.errors import InputError
 from geometry.arrays import Floats
-from geometry.errors import InputError
 
 LEAST_FOR_PLANE = 6
 LEAST_FOR_BODY = 8

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from lxml import etree
 
-from geometry.errors import ConflictError, InputError, NotFoundError
+from common.errors import ConflictError, InputError, NotFoundError
 from geometry.exchange import FORMATS, ExportOptions, export_files, image_stem, write_export
 
 REPO = Path(__file__).resolve().parents[3]

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from exchange_rigs import hand_rig, many_cameras, points_in_view
 
+from common.errors import InputError
 from geometry.camera import RigCamera, distort
-from geometry.errors import InputError
 from geometry.exchange import export_files
 from geometry.exchange.kalibr import WORST_PX
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from geometry.errors import InputError
+from common.errors import InputError
 from rig.catalogue import Catalogue, CatalogueCamera, fit, load_catalogue
 from rig.catalogue.model import ENTRIES
 

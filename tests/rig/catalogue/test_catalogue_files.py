@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from geometry.errors import InputError, NotFoundError
+from common.errors import InputError, NotFoundError
 from rig.catalogue import Catalogue, catalogue_entry, catalogue_rows, load_catalogue
 from rig.catalogue.loader import _parse
 

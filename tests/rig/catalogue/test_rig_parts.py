@@ -9,10 +9,10 @@ import jsonschema
 import numpy as np
 import pytest
 
-from geometry.errors import InputError
+from common.errors import InputError
 from geometry.optics import depth_of_field_mm
 from rig.catalogue import load_catalogue
-from rig.rigfile import RigFile, parse_rig, read_rig, rig_from_mapping
+from rig.specification.rigfile import RigFile, parse_rig, read_rig, rig_from_mapping
 
 REPO = Path(__file__).resolve().parents[3]
 EXAMPLE = {"model": "canon-eos-250d", "lens": "canon-ef-50-f18-stm", "f_number": 16}

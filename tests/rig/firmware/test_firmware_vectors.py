@@ -8,7 +8,7 @@ import pytest
 import serial
 from firmware_sim import FirmwareSim
 
-conformance = pytest.importorskip("rig.trigger.conformance")
+conformance = pytest.importorskip("rig.acquisition.trigger.conformance")
 
 VECTORS: dict[str, Any] = conformance.load_vectors()
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from geometry.errors import InputError
+from common.errors import InputError
 from rig.simulation.behaviour import CameraClock, camera_key, draw
 from rig.simulation.faults import CameraFaults
 

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from simulated_rigs import STRONG, lens, placed
 
+from common.errors import InputError
 from geometry.camera import RigCamera
-from geometry.errors import InputError
 from rig.simulation.flats import Flat, held_up, target
 from rig.simulation.flatsettings import HeldSettings, PlaceSettings, TargetSettings
 from rig.simulation.settings import HeadSettings, SceneSettings, SensorSettings

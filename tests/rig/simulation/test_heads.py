@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from simulated_rigs import lens, placed
 
-from geometry.errors import InputError, NotFoundError
+from common.errors import InputError, NotFoundError
 from geometry.reading import read_scan
 from rig.simulation.heads import head_mesh
 from rig.simulation.mesh import subdivided

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from geometry.errors import InputError
+from common.errors import InputError
 from rig.simulation.mesh import TexturedMesh, subdivided
 
 PICTURE = np.zeros((4, 4, 3), dtype=np.uint8)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from simulated_rigs import lens, placed
 
-from rig.cameras.base import Image
+from rig.acquisition.cameras.base import Image
 from rig.simulation.raytable import ray_table
 from rig.simulation.sensor import developed
 from rig.simulation.settings import BackdropSettings, SceneSettings, SensorSettings

@@ -14,15 +14,15 @@ import numpy as np
 import pytest
 from simulated_rigs import lens, placed, report
 
-from geometry.errors import DeviceError, InputError
-from rig.cameras.base import ArmSpec, CameraSettings, Frame, FrameStatus, TriggerKind
+from common.errors import DeviceError, InputError
+from rig.acquisition.cameras.base import ArmSpec, CameraSettings, Frame, FrameStatus, TriggerKind
+from rig.acquisition.timingboard.reading import read_board
+from rig.acquisition.trigger.box import FireReport
 from rig.simulation.backend import SimulatedBackend
 from rig.simulation.faults import CameraFaults
 from rig.simulation.flatsettings import BoardSettings, PlaceSettings, TargetSettings
 from rig.simulation.motion import knocked, rotation_by
 from rig.simulation.settings import LightSettings, SceneSettings, SensorSettings, SimulationSettings
-from rig.timingboard.reading import read_board
-from rig.trigger.box import FireReport
 
 REPO = Path(__file__).resolve().parents[3]
 RIG = tuple(
@@ -456,7 +456,7 @@ SCRIPT = """
 import sys, time
 sys.path[:0] = ["tests/support"]
 from simulated_rigs import lens, placed, report
-from rig.cameras.base import ArmSpec
+from rig.acquisition.cameras.base import ArmSpec
 from rig.simulation.backend import SimulatedBackend
 from rig.simulation.settings import SceneSettings, SimulationSettings
 

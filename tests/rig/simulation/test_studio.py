@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from simulated_rigs import STRONG, lens, placed, three
 
-from geometry.errors import InputError, NotFoundError
+from common.errors import InputError, NotFoundError
 from rig.simulation.motion import placement_at
 from rig.simulation.settings import (
     HeadSettings,

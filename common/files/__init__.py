@@ -1,0 +1,1 @@
+"""Files: read strictly with one-line errors, written whole or not at all."""

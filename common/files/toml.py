@@ -1,0 +1,42 @@
+"""Files that people write as TOML: read with a limit, and with one-line errors of their kind."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from common.errors import InputError, TooLargeError
+
+LARGEST_FILE_BYTES = 1_000_000
+
+
+def read_text(path: Path, kind: str, words: str) -> str:
+    """The text of a file; ``kind`` stands in error codes, ``words`` says what it is.
+
+    Raises :class:`InputError` ``<kind>-unreadable`` and ``<kind>-not-toml``,
+    :class:`TooLargeError` ``<kind>-too-large``.
+    """
+    remedy = f"give the {kind}'s TOML file"
+    try:
+        if path.stat().st_size > LARGEST_FILE_BYTES:
+            problem = f"{path.name} is too large for a {words}"
+            raise TooLargeError(f"{kind}-too-large", problem, remedy)
+        return path.read_text(encoding="utf-8")
+    except OSError as error:
+        reason = (error.strerror or "unreadable").lower()
+        raise InputError(
+            f"{kind}-unreadable", f"cannot read the {words} {path} ({reason})", "check the path"
+        ) from error
+    except UnicodeDecodeError as error:
+        problem = f"{path.name} is not a text file"
+        raise InputError(f"{kind}-not-toml", problem, remedy) from error
+
+
+def parsed(text: str, name: str, kind: str, words: str) -> dict[str, Any]:
+    """A file's text as data; ``name`` stands in front of the error."""
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        problem = f"{name} is not a {words}: {error}"
+        raise InputError(f"{kind}-not-toml", problem, "write it as TOML") from error

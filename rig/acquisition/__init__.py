@@ -1,0 +1,1 @@
+"""What is fired: cameras, trigger box, station, captures, sessions, their evidence."""

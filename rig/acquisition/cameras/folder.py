@@ -1,0 +1,318 @@
+"""Cameras whose files another program fetches into folders: tethering software, card readers.
+
+The program may write slowly and in pieces. A file counts when its size has not changed for a while
+and it has all that its header promises.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from common.errors import DeviceError, InputError, NotFoundError
+from common.files.strict import StrictModel
+from rig.acquisition.cameras.base import (
+    ArmSpec,
+    CameraCapabilities,
+    CameraHealth,
+    CameraInfo,
+    CameraSettings,
+    ClockSample,
+    Frame,
+    FrameStatus,
+    TimestampKind,
+    TriggerKind,
+)
+from rig.acquisition.cameras.exif import exposure_us, read_exif
+from rig.acquisition.cameras.options import read_options
+from rig.acquisition.cameras.wholeness import MEDIA_TYPES, is_whole
+
+POLL_S = 0.03
+
+
+class FolderOptions(StrictModel):
+    """Options of folder cameras."""
+
+    root: str
+    by: Literal["folder", "serial"] = "folder"
+    """Which camera a file is of: the one its folder is named after, or the body whose serial
+    number stands in its EXIF."""
+    cameras: Annotated[dict[str, str], Field(default_factory=dict)]
+    """Names of cameras and their folder below ``root``, or their serial number; empty: every
+    folder, or every number seen, is a camera."""
+    suffixes: tuple[str, ...] = ()
+    """Files wanted, such as ``[".jpg"]``; empty: all kinds of pictures."""
+    settle_s: Annotated[float, Field(ge=0, le=60)] = 0.3
+    """How long a file must not have changed."""
+    trigger: Literal["edge", "none"] = "none"
+    """``edge`` where the trigger box fires these cameras by cable."""
+
+
+@dataclass(frozen=True)
+class Stamp:
+    """What changes when a file is written to."""
+
+    size: int
+    modified_ns: int
+
+
+class Watch:
+    """The files below a folder, looked at by name and time; remembers what it read of them."""
+
+    def __init__(self, root: Path, suffixes: Sequence[str]) -> None:
+        self.root = root
+        self._suffixes = tuple(s.lower() for s in suffixes) or tuple(MEDIA_TYPES)
+        self._whole: dict[tuple[Path, Stamp], bool] = {}
+        self._tags: dict[tuple[Path, Stamp], Mapping[str, str]] = {}
+        self._books = threading.Lock()
+
+    def files(self, below: Path) -> dict[Path, Stamp]:
+        """Picture files and their stamps. OSError when the folder is not there."""
+        below.stat()
+        found = {}
+        for path in below.rglob("*"):
+            if path.suffix.lower() not in self._suffixes or path.name.startswith("."):
+                continue
+            try:
+                stat = path.stat()
+            except OSError:  # renamed or removed by its program just now
+                continue
+            found[path] = Stamp(stat.st_size, stat.st_mtime_ns)
+        return found
+
+    def whole(self, path: Path, stamp: Stamp) -> bool:
+        """Whether the file is all there; what is not is looked at again."""
+        with self._books:
+            if self._whole.get((path, stamp)):
+                return True
+            self._whole[path, stamp] = is_whole(path)
+            return self._whole[path, stamp]
+
+    def tags(self, path: Path, stamp: Stamp) -> Mapping[str, str]:
+        """The EXIF of a whole file."""
+        with self._books:
+            if (path, stamp) not in self._tags:
+                self._tags[path, stamp] = read_exif(path)
+            return self._tags[path, stamp]
+
+
+class FolderCamera:
+    """One camera whose files arrive in a folder; a :class:`CameraDevice`."""
+
+    def __init__(self, watch: Watch, options: FolderOptions, info: CameraInfo, key: str) -> None:
+        self._watch, self._options, self._info, self._key = watch, options, info, key
+        self._below = watch.root / key if options.by == "folder" else watch.root
+        self._known: dict[Path, Stamp | None] = {}
+        self._settling: dict[Path, tuple[Stamp, float]] = {}
+        self._frames: list[Frame] = []
+        self._armed = False
+        self._closed = False
+        self._counts: Counter[str] = Counter()
+        self._known = self._look()
+
+    @property
+    def info(self) -> CameraInfo:
+        """Which camera this is."""
+        return self._info
+
+    @property
+    def capabilities(self) -> CameraCapabilities:
+        """Nothing but files: the program that fetches them tells no more."""
+        return CameraCapabilities(
+            trigger=TriggerKind(self._options.trigger),
+            timestamps=TimestampKind.NONE,
+            frame_counter=False,
+        )
+
+    def configure(self, settings: CameraSettings) -> CameraSettings:
+        """Nothing can be set from here; InputError when it is asked for."""
+        if settings != CameraSettings():
+            raise InputError(
+                "camera-setting",
+                f"camera {self._info.id} is only seen through its files",
+                "set it in the program that fetches them, and leave the settings out here",
+            )
+        return CameraSettings()
+
+    def _look(self) -> dict[Path, Stamp | None]:
+        """Files that are there now; None for those still being written."""
+        try:
+            files = self._watch.files(self._below)
+        except OSError as error:
+            raise self._gone(error) from None
+        return {p: s if self._watch.whole(p, s) else None for p, s in files.items()}
+
+    def _gone(self, error: OSError | None = None) -> DeviceError:
+        why = "it was closed" if self._closed else f"its folder: {error and error.strerror}"
+        return DeviceError(
+            "camera-gone",
+            f"camera {self._info.id} (folder) is gone: {why}",
+            "see that the folder is there and can be read, then arm again",
+        )
+
+    def arm(self, spec: ArmSpec) -> None:  # noqa: ARG002  the folder needs no preparation
+        """Remember what is there already; only what comes from now on counts."""
+        if self._closed:
+            raise self._gone()
+        present = self._look()
+        fetched = {frame.metadata["path"] for frame in self._frames}
+        self._counts["stale_frames"] += sum(
+            self._is_new(path, stamp) and str(path) not in fetched
+            for path, stamp in present.items()
+            if stamp is not None and self._is_mine(path, stamp)
+        )
+        self._known, self._frames, self._armed = present, [], True
+        self._settling.clear()
+
+    def _is_new(self, path: Path, stamp: Stamp) -> bool:
+        # A file that was half there when the camera was armed is of an earlier shot, however
+        # much it changes; one that was whole and changes has been written anew.
+        if path not in self._known:
+            return True
+        known = self._known[path]
+        return known is not None and known != stamp
+
+    def _is_mine(self, path: Path, stamp: Stamp) -> bool:
+        if self._options.by == "folder":
+            return True
+        return self._watch.tags(path, stamp).get("BodySerialNumber") == self._key
+
+    def software_trigger(self) -> None:
+        """Never: these cameras are fired by somebody else."""
+        raise InputError(
+            "camera-trigger",
+            f"camera {self._info.id} is only seen through its files",
+            "fire it by the trigger box or by the program that fetches its files",
+        )
+
+    def wait_frames(self, count: int, timeout_s: float) -> Sequence[Frame]:
+        """The files that came since :meth:`arm`, whole ones only."""
+        deadline = time.monotonic() + timeout_s
+        while self._armed:
+            began = time.monotonic()
+            try:
+                self._collect()
+            except OSError:  # the folder went; health and the next arm say so
+                break
+            left = deadline - time.monotonic()
+            if len(self._frames) >= count or left <= 0:
+                break
+            # A large tree on a slow share must not be read without a pause.
+            time.sleep(min(max(POLL_S, time.monotonic() - began), left))
+        return tuple(self._frames)
+
+    def _collect(self) -> None:
+        now = time.monotonic()
+        files = self._watch.files(self._below)
+        for path, stamp in sorted(files.items(), key=lambda item: (item[1].modified_ns, item[0])):
+            if not self._is_new(path, stamp):
+                continue
+            seen, since = self._settling.get(path, (None, now))
+            if seen != stamp:
+                self._settling[path] = (stamp, now)
+                since = now
+            if now - since >= self._options.settle_s and self._watch.whole(path, stamp):
+                self._known[path] = stamp
+                if self._is_mine(path, stamp):
+                    self._take(path, stamp)
+
+    def _take(self, path: Path, stamp: Stamp) -> None:
+        tags = self._watch.tags(path, stamp)
+        self._frames.append(
+            Frame(
+                camera_id=self._info.id,
+                arrived_host_ns=time.monotonic_ns(),
+                status=FrameStatus.OK,
+                encoded=path.read_bytes(),
+                media_type=MEDIA_TYPES[path.suffix.lower()],
+                exposure_us=exposure_us(tags),
+                metadata={**tags, "file": path.name, "path": str(path)},
+            )
+        )
+        self._counts["frames"] += 1
+
+    def disarm(self) -> None:
+        """Look at the folder no more."""
+        self._armed = False
+
+    def clock_samples(self, count: int) -> Sequence[ClockSample]:  # noqa: ARG002
+        """Files tell no clock finely enough."""
+        return ()
+
+    def health(self) -> CameraHealth:
+        """Whether the folder is there and how many files are on their way."""
+        there = self._below.is_dir() and not self._closed
+        problem = "" if there else "it was closed" if self._closed else "its folder is not there"
+        counts = {**self._counts, "unfinished_files": self._unfinished()}
+        return CameraHealth(there, self._armed and there, problem, counts)
+
+    def _unfinished(self) -> int:
+        return sum(self._known.get(path) != stamp for path, (stamp, _) in self._settling.items())
+
+    def close(self) -> None:
+        """Let go of it; the files stay as they are."""
+        self._closed, self._armed = True, False
+
+
+class FolderBackend:
+    """Cameras behind a tree of folders; a :class:`~rig.acquisition.cameras.base.CameraBackend`."""
+
+    name = "folder"
+
+    def __init__(self, **options: object) -> None:
+        self._options = read_options("folder", FolderOptions, options)
+        root = Path(self._options.root).expanduser()
+        if not root.is_dir():
+            raise InputError(
+                "camera-option", f"there is no folder {root}", "correct the option 'root'"
+            )
+        self._watch = Watch(root, self._options.suffixes)
+        self._open: list[FolderCamera] = []
+
+    def _keys(self) -> Mapping[str, str]:
+        if self._options.cameras:
+            return self._options.cameras
+        root = self._watch.root
+        if self._options.by == "folder":
+            names = [entry.name for entry in root.iterdir() if entry.is_dir()]
+        else:
+            files = self._watch.files(root).items()
+            tags = [self._watch.tags(p, s) for p, s in files if self._watch.whole(p, s)]
+            names = [tag["BodySerialNumber"] for tag in tags if "BodySerialNumber" in tag]
+        return {name: name for name in names if not name.startswith(".")}
+
+    def discover(self) -> Sequence[CameraInfo]:
+        """Cameras named in the options, else the folders or the serial numbers that are there."""
+        return tuple(self._info(name, key) for name, key in sorted(self._keys().items()))
+
+    def _info(self, name: str, key: str) -> CameraInfo:
+        root = self._watch.root
+        address = root / key if self._options.by == "folder" else root
+        return CameraInfo(name, "folder", address=str(address))
+
+    def open(self, camera_id: str) -> FolderCamera:
+        """Open one by its name."""
+        keys = self._keys()
+        if camera_id not in keys:
+            raise NotFoundError(
+                "camera",
+                f"there is no camera '{camera_id}' below {self._watch.root}",
+                f"make its folder, or name it in 'cameras'; known: {', '.join(keys) or 'none'}",
+            )
+        key = keys[camera_id]
+        camera = FolderCamera(self._watch, self._options, self._info(camera_id, key), key)
+        self._open.append(camera)
+        return camera
+
+    def close(self) -> None:
+        """Close what is open."""
+        for camera in self._open:
+            camera.close()
+        self._open.clear()

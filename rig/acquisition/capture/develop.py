@@ -1,0 +1,161 @@
+"""From what the devices gave to pictures with their shots and all faults named."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from common.errors import DeviceError
+from rig.acquisition.cameras.base import CameraCapabilities, ClockSample, TriggerKind
+from rig.acquisition.capture.collect import Collected
+from rig.acquisition.capture.firing import Firing
+from rig.acquisition.capture.hands import CameraHand
+from rig.acquisition.station.spec import CameraPlan, Station
+from rig.acquisition.synchrony.clocks import ClockFitter, DeviceClock, Instant, clock_jumped
+from rig.acquisition.synchrony.faults import Fault, FaultKind
+from rig.acquisition.synchrony.instants import command_instants, edge_instants
+from rig.acquisition.synchrony.looks import is_raw, look_faults
+from rig.acquisition.synchrony.pairing import pair
+from rig.acquisition.synchrony.shooting import CameraPart, Shooting
+from rig.acquisition.synchrony.swaps import swapped
+from rig.acquisition.synchrony.take import Pairing, Take
+from rig.acquisition.trigger.box import Outcome
+
+Sizes = Mapping[str, tuple[int, int]]
+
+
+def develop(station: Station, firing: Firing, fit: ClockFitter, sizes: Sizes) -> Shooting:
+    """Pair and judge everything one firing gave. ``sizes``: what pictures must measure, by camera.
+
+    Raises :class:`DeviceError` ``trigger-unknown`` when nobody can tell whether the box fired,
+    and no picture shows that it did.
+    """
+    shots = _shots_done(firing)
+    parts = tuple(_part(station, firing, hand, fit, sizes, shots) for hand in firing.hands)
+    _require_fired(firing, parts)
+    faults = [*firing.faults, *_stopped(firing, shots), *swapped(station, parts)]
+    return Shooting(
+        capture_id=firing.order.capture_id,
+        shots=firing.order.shots,
+        interval_us=firing.order.interval_us,
+        fired_at=firing.fired_at,
+        fired_host_ns=firing.fired.middle_ns,
+        request=firing.request,
+        report=firing.report,
+        shots_done=shots,
+        parts=parts,
+        absent=firing.absent,
+        faults=tuple(faults),
+    )
+
+
+def _shots_done(firing: Firing) -> int:
+    """How many shots there were; a lost box is taken to have made them all until shown wrong."""
+    report = firing.report
+    if report is None or report.outcome is Outcome.UNKNOWN:
+        return firing.order.shots
+    return report.shots_done
+
+
+def _require_fired(firing: Firing, parts: tuple[CameraPart, ...]) -> None:
+    if firing.report is None or firing.report.outcome is not Outcome.UNKNOWN:
+        return
+    if not any(part.pairing.pairs for part in parts):
+        raise DeviceError(
+            "trigger-unknown",
+            "whether the box fired cannot be told, and no camera gave a picture "
+            f"({firing.report.why or 'the box was lost'})",
+            "see to the box, then take a new capture under another id",
+        )
+
+
+def _stopped(firing: Firing, shots: int) -> list[Fault]:
+    if shots >= firing.order.shots:
+        return []
+    why = firing.report.why if firing.report is not None else ""
+    text = f"the burst was stopped after {shots} of {firing.order.shots} shots"
+    return [Fault(FaultKind.NOT_FIRED, f"{text} ({why})" if why else text)]
+
+
+def _part(
+    station: Station,
+    firing: Firing,
+    hand: CameraHand,
+    fit: ClockFitter,
+    sizes: Sizes,
+    shots: int,
+) -> CameraPart:
+    name = hand.plan.name
+    got, ready = firing.collected[name], firing.ready[name]
+    capabilities = hand.device.capabilities
+    samples = (*ready.clock_samples, *got.clock_samples)
+    clock, jumped = _clock(samples, fit)
+    plan = _with_known_lag(hand.plan, capabilities)
+    pictures = tuple(frame for frame in got.frames if not is_raw(frame))
+    raws = tuple(frame for frame in got.frames if is_raw(frame))
+    take = Take(
+        camera=name,
+        capabilities=capabilities,
+        frames=pictures or raws,
+        instants=_instants(station, firing, hand.plan, capabilities, got, shots),
+        armed_host_ns=ready.armed_host_ns,
+        clock=clock,
+        clock_jumped=jumped,
+        lag_us=plan.expected_lag_us,
+        lag_tolerance_us=plan.lag_tolerance_us,
+        deadline_s=station.policy.frame_deadline_s,
+    )
+    paired = _explained(_judged(_pair_if_shot(take), sizes.get(name)), got.problem)
+    beside = _pair_if_shot(replace(take, frames=raws)) if pictures and raws else None
+    return CameraPart(hand.plan, hand.device.info, ready.settings, take, paired, beside, samples)
+
+
+def _pair_if_shot(take: Take) -> Pairing:
+    """The pairing, with deadlines; a burst that was stopped before its first shot has none."""
+    return pair(take) if take.instants else Pairing(take.camera, (), ())
+
+
+def _with_known_lag(plan: CameraPlan, capabilities: CameraCapabilities) -> CameraPlan:
+    """The camera's own word on its lag, where the station file has none."""
+    delay = capabilities.exposure_start_delay_us
+    if plan.expected_lag_us == 0.0 and delay is not None:
+        return replace(plan, expected_lag_us=delay)
+    return plan
+
+
+def _clock(samples: tuple[ClockSample, ...], fit: ClockFitter) -> tuple[DeviceClock | None, bool]:
+    if clock_jumped(samples):
+        return None, True
+    return fit(samples) if samples else None, False
+
+
+def _instants(
+    station: Station,
+    firing: Firing,
+    plan: CameraPlan,
+    capabilities: CameraCapabilities,
+    got: Collected,
+    shots: int,
+) -> tuple[Instant, ...]:
+    if capabilities.trigger is TriggerKind.SOFTWARE:
+        return command_instants(got.sent)
+    return edge_instants(
+        station, plan, firing.report, firing.fired, shots, firing.order.interval_us
+    )
+
+
+def _judged(pairing: Pairing, size_px: tuple[int, int] | None) -> Pairing:
+    return replace(pairing, faults=(*pairing.faults, *look_faults(pairing, size_px)))
+
+
+def _explained(pairing: Pairing, problem: str) -> Pairing:
+    """The camera's own word on why pictures are missing, where it has one."""
+    if not problem:
+        return pairing
+    faults = tuple(
+        replace(fault, text=f"{fault.text} ({problem})")
+        if fault.kind is FaultKind.MISSING
+        else fault
+        for fault in pairing.faults
+    )
+    return replace(pairing, faults=faults)

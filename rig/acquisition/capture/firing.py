@@ -1,0 +1,67 @@
+"""What goes into a run and what comes out of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import datetime
+from enum import StrEnum
+
+from rig.acquisition.cameras.base import CameraSettings, ClockSample
+from rig.acquisition.capture.collect import Collected
+from rig.acquisition.capture.hands import CameraHand
+from rig.acquisition.synchrony.faults import Fault
+from rig.acquisition.synchrony.instants import Bracket
+from rig.acquisition.trigger.box import ArmRequest, FireReport, Outcome
+
+
+class Fate(StrEnum):
+    """What is known of a capture's FIRE."""
+
+    NOT_FIRED = "not-fired"
+    UNKNOWN = "unknown"
+    FIRED = "fired"
+
+
+FATES = {
+    Outcome.FIRED: Fate.FIRED,
+    Outcome.PARTIAL: Fate.FIRED,
+    Outcome.NOT_FIRED: Fate.NOT_FIRED,
+    Outcome.UNKNOWN: Fate.UNKNOWN,
+}
+
+
+@dataclass(frozen=True)
+class Order:
+    """One capture as it was asked for. ``box_capture`` is its name at the box."""
+
+    capture_id: str
+    box_capture: str
+    shots: int = 1
+    interval_us: float = 0.0
+    allow_partial: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Ready:
+    """A camera that is armed, and what it said meanwhile."""
+
+    settings: CameraSettings
+    armed_host_ns: int
+    clock_samples: tuple[ClockSample, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Firing:
+    """What the devices gave. ``fired_at`` is wall-clock time of ``fired.middle_ns``."""
+
+    order: Order
+    request: ArmRequest | None
+    report: FireReport | None
+    fired: Bracket
+    fired_at: datetime
+    hands: tuple[CameraHand, ...]
+    ready: Mapping[str, Ready]
+    collected: Mapping[str, Collected]
+    absent: tuple[str, ...] = ()
+    faults: tuple[Fault, ...] = ()

@@ -1,0 +1,278 @@
+"""From arming to the last picture: what a capture does to devices. Nothing is written here."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from functools import partial
+
+from common.errors import CancelledError, DeviceError, InterlockError, RigwrightError
+from common.progress import CancelToken, Progress, ProgressCallback
+from rig.acquisition.cameras.base import ArmSpec, CameraDevice, CameraSettings
+from rig.acquisition.capture.collect import Collected, Want, collect, read_clock
+from rig.acquisition.capture.firing import FATES, Fate, Firing, Order, Ready
+from rig.acquisition.capture.hands import CameraHand, do_all, outcomes
+from rig.acquisition.station.pulses import arm_request
+from rig.acquisition.station.spec import Interlock, Station
+from rig.acquisition.synchrony.faults import Fault, FaultKind
+from rig.acquisition.synchrony.instants import Bracket
+from rig.acquisition.trigger.box import ArmRequest, FireReport, Outcome, TriggerBox
+
+WATCH_S = 0.05
+BOX_MARGIN_S = 2.0
+"""What a box may take beyond its pulses to say what became of them."""
+
+
+@dataclass
+class CaptureRun:
+    """One run over open devices. Everything is disarmed on every way out of :meth:`run`.
+
+    ``may_fire`` is called when the box is about to be armed: the last moment at which it is
+    certain that nothing has been fired.
+    """
+
+    station: Station
+    box: TriggerBox | None
+    hands: tuple[CameraHand, ...]
+    order: Order
+    progress: ProgressCallback
+    cancel: CancelToken
+    may_fire: Callable[[], None]
+    unopened: Mapping[str, str] = field(default_factory=dict)
+    """Cameras of the station that could not be opened, and why."""
+    fate: Fate = Fate.NOT_FIRED
+    _armed: list[str] = field(default_factory=list)
+    _give_up: threading.Event = field(default_factory=threading.Event)
+    _pictures: int = 0
+
+    def run(self) -> Firing:
+        """Arm, fire and collect. :attr:`fate` says what is known of FIRE, also after an error.
+
+        Raises :class:`DeviceError` ``camera-not-ready``, ``trigger-not-fired`` or what the
+        devices raise, :class:`InterlockError`, :class:`CancelledError`.
+        """
+        self._check_box()
+        try:
+            ready, faults = self._arm_cameras()
+            self._stop_if_cancelled()
+            hands = tuple(hand for hand in self.hands if hand.plan.name in ready)
+            self.may_fire()
+            request = self._arm_box(hands)
+            self._stop_if_cancelled()
+            return self._fire(hands, ready, request, faults)
+        finally:
+            self._disarm()
+
+    def rehearse(self) -> tuple[Fault, ...]:
+        """All but fire; returns what :meth:`run` would have had to do without.
+
+        Raises what :meth:`run` would raise up to FIRE.
+        """
+        self._check_box()
+        try:
+            ready, faults = self._arm_cameras()
+            self._stop_if_cancelled()
+            self._arm_box(tuple(hand for hand in self.hands if hand.plan.name in ready))
+            return faults
+        finally:
+            self._disarm()
+
+    def _check_box(self) -> None:
+        """Refuse early what the box would refuse late."""
+        if self.box is None or self.station.trigger is None:
+            return
+        closed = self.box.health().interlock_closed
+        required = self.station.trigger.interlock is Interlock.REQUIRED
+        if closed is False or (required and closed is None):
+            what = "is open" if closed is False else "is required, and the box has none"
+            raise InterlockError("open", f"the interlock {what}", "close it, then try again")
+
+    def _arm_cameras(self) -> tuple[dict[str, Ready], tuple[Fault, ...]]:
+        self.progress(Progress("arming cameras", 0.05))
+        policy = self.station.policy
+        spec = ArmSpec(self.order.capture_id, self.order.shots, policy.frame_deadline_s)
+        jobs = {
+            hand.plan.name: hand.do(partial(_arm, settings=hand.plan.settings, spec=spec))
+            for hand in self.hands
+        }
+        ready, late = outcomes(jobs, policy.ready_deadline_s)
+        problems = {**self.unopened, **late}
+        if problems and not (self.order.allow_partial and ready):
+            told = "; ".join(f"{name}: {text}" for name, text in problems.items())
+            raise DeviceError(
+                "camera-not-ready",
+                f"{len(problems)} of {len(self.station.cameras)} cameras are not ready ({told})",
+                "see to them, or allow a partial capture",
+            )
+        faults = tuple(
+            Fault(FaultKind.NOT_READY, f"{name} was not ready: {text}", name)
+            for name, text in problems.items()
+        )
+        return ready, faults
+
+    def _arm_box(self, hands: tuple[CameraHand, ...]) -> ArmRequest | None:
+        if self.box is None:
+            return None
+        self.progress(Progress("arming the box", 0.25))
+        plans = tuple(hand.plan for hand in hands)
+        order = self.order
+        request = arm_request(
+            self.station, plans, order.box_capture, order.shots, order.interval_us
+        )
+        if not any(pulse.width_us > 0.0 for pulse in request.pulses.values()):
+            # Cameras that are told over their bus, and no light: the box has nothing to do.
+            return None
+        self._armed.append(order.box_capture)
+        self.box.arm(request)
+        return request
+
+    def _fire(
+        self,
+        hands: tuple[CameraHand, ...],
+        ready: dict[str, Ready],
+        request: ArmRequest | None,
+        faults: tuple[Fault, ...],
+    ) -> Firing:
+        self.progress(Progress("firing", 0.3))
+        self._pictures = self.order.shots
+        start = threading.Event()
+        jobs = {
+            hand.plan.name: hand.do(partial(collect, want=self._want(hand, ready, start)))
+            for hand in hands
+        }
+        self.fate = Fate.UNKNOWN
+        before = time.monotonic_ns()
+        start.set()
+        try:
+            with self._abort_when_cancelled():
+                problem = self._fire_box(request)
+                fired = Bracket(before, time.monotonic_ns())
+                wall = datetime.fromtimestamp(time.time(), UTC).astimezone()
+                report = self._await_box(problem, request)
+                self.progress(Progress("waiting for pictures", 0.4))
+                patience_s = self._last_deadline_s() + BOX_MARGIN_S + _overrun_s(hands)
+                collected, problems = outcomes(jobs, patience_s)
+        finally:
+            # The camera threads must not go on waiting for pictures that nobody will take.
+            self._give_up.set()
+        self._stop_if_cancelled()
+        for name, text in problems.items():
+            collected[name] = Collected(problem=text)
+        absent = tuple(fault.camera for fault in faults if fault.camera is not None)
+        return Firing(
+            self.order, request, report, fired, wall, hands, ready, collected, absent, faults
+        )
+
+    def _want(self, hand: CameraHand, ready: Mapping[str, Ready], start: threading.Event) -> Want:
+        policy, plan = self.station.policy, hand.plan
+        samples = ready[plan.name].clock_samples
+        lead = 0.0 if self.station.trigger is None else self.station.trigger.lead_us
+        return Want(
+            shots=self.order.shots,
+            pictures=lambda: self._pictures,
+            interval_s=self.order.interval_us / 1e6,
+            first_s=(lead + self.station.shutter_delay_us(plan)) / 1e6,
+            deadline_s=self._last_deadline_s() - policy.settle_s,
+            settle_s=policy.settle_s,
+            start=start,
+            give_up=self._give_up,
+            ready_stamp=max((sample.device_ns for sample in samples), default=None),
+        )
+
+    def _fire_box(self, request: ArmRequest | None) -> DeviceError | None:
+        """Fire; a lost box is no error yet, because what it did is still to be found out."""
+        if self.box is None or request is None:
+            return None
+        try:
+            self.box.fire(request.capture_id)
+        except DeviceError as error:
+            return error
+        except RigwrightError:
+            # Refused by the box: nothing was fired.
+            self.fate = Fate.NOT_FIRED
+            raise
+        return None
+
+    def _await_box(
+        self, problem: DeviceError | None, request: ArmRequest | None
+    ) -> FireReport | None:
+        if self.box is None or request is None:
+            self.fate = Fate.FIRED
+            return None
+        report = self.box.wait_done(request.capture_id, self._pulses_s(request) + BOX_MARGIN_S)
+        self.fate = FATES[report.outcome]
+        if report.outcome is Outcome.PARTIAL:
+            # Nobody needs to wait for pictures of shots that were not made.
+            self._pictures = report.shots_done
+        if report.outcome is Outcome.NOT_FIRED:
+            self._stop_if_cancelled()
+            raise problem or DeviceError(
+                "trigger-not-fired",
+                f"the box did not fire ({report.why or 'it says so'})",
+                "see to the box, then take the capture again",
+            )
+        return report
+
+    def _pulses_s(self, request: ArmRequest) -> float:
+        ends = [pulse.delay_us + pulse.width_us for pulse in request.pulses.values()]
+        burst = (request.shots - 1) * request.interval_us
+        return (request.lead_us + burst + max(ends, default=0.0)) / 1e6
+
+    def _last_deadline_s(self) -> float:
+        """From FIRE to the deadline of the last picture."""
+        order, trigger = self.order, self.station.trigger
+        lead = 0.0 if trigger is None else trigger.lead_us
+        delays = [self.station.shutter_delay_us(hand.plan) for hand in self.hands]
+        burst = (order.shots - 1) * order.interval_us
+        policy = self.station.policy
+        return (lead + burst + max(delays)) / 1e6 + policy.frame_deadline_s + policy.settle_s
+
+    def _stop_if_cancelled(self) -> None:
+        if self.cancel.is_set():
+            raise CancelledError
+
+    @contextlib.contextmanager
+    def _abort_when_cancelled(self) -> Iterator[None]:
+        """While inside, a cancel takes all outputs low at once and ends the wait for pictures."""
+        over = threading.Event()
+
+        def watch() -> None:
+            while not over.wait(WATCH_S):
+                if self.cancel.is_set():
+                    self._give_up.set()
+                    if self.box is not None:
+                        with contextlib.suppress(RigwrightError):
+                            self.box.abort()
+                    return
+
+        thread = threading.Thread(target=watch, name="capture-watch", daemon=True)
+        thread.start()
+        try:
+            yield
+        finally:
+            over.set()
+            thread.join()
+
+    def _disarm(self) -> None:
+        if self.box is not None:
+            for name in self._armed:
+                # A box that is gone disarms itself; the cameras must be disarmed all the same.
+                with contextlib.suppress(RigwrightError):
+                    self.box.disarm(name)
+        do_all(self.hands, lambda device: device.disarm(), self.station.policy.ready_deadline_s)
+
+
+def _overrun_s(hands: tuple[CameraHand, ...]) -> float:
+    return max((hand.device.capabilities.wait_overrun_s for hand in hands), default=0.0)
+
+
+def _arm(device: CameraDevice, settings: CameraSettings, spec: ArmSpec) -> Ready:
+    had = device.configure(settings)
+    device.arm(spec)
+    armed = time.monotonic_ns()
+    # Read after arming: some cameras set their clocks to zero when acquisition starts.
+    return Ready(had, armed, read_clock(device))

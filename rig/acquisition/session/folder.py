@@ -1,0 +1,244 @@
+"""A session: a plain folder that holds what was photographed of one subject at one sitting."""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import glob
+import os
+import re
+import secrets
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from common.errors import ConflictError, InputError, NotFoundError
+from rig.acquisition.session import places
+from rig.acquisition.session.commit import Books, write_books
+from rig.acquisition.session.jsonfiles import entry
+from rig.acquisition.session.records import CaptureRecord, InterruptedEntry, SessionFile
+from rig.acquisition.session.recovery import Recovery, read_books, recover_books
+from rig.acquisition.session.storage import Disk, disk_errors
+from rig.design.designfile import program_version
+
+CAPTURE_ID = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
+MEGABYTE = 1e6
+
+
+@dataclass(frozen=True)
+class SessionPlan:
+    """What a new session is about. ``rig_files``: the content of its folder ``rig``, by path.
+
+    ``rig_sha256`` names the rig: sessions are continued only with the same one.
+    """
+
+    station: str
+    rig_sha256: str
+    rig_files: Mapping[str, bytes] = field(default_factory=dict)
+    subject: str = ""
+    operator: str = ""
+
+
+class Session:
+    """An open session; one process at a time has it. Closing lets another have it."""
+
+    def __init__(self, books: Books, lock: int, recovery: Recovery) -> None:
+        self.books = books
+        self.recovery = recovery
+        self._lock: int | None = lock
+
+    @classmethod
+    def create(cls, folder: Path, plan: SessionPlan, disk: Disk | None = None) -> Self:
+        """Begin a session in a new folder; it appears whole or not at all.
+
+        Raises :class:`ConflictError` ``session-exists`` when the folder is there already.
+        """
+        disk = Disk() if disk is None else disk
+        half = folder.with_name(f".{folder.name}.{secrets.token_hex(4)}.part")
+        with disk_errors(folder.parent):
+            _require_new(folder)
+            disk.make_folder(folder.parent)
+            _remove_stale(folder, disk)
+            disk.make_folder(half)
+            # The lock is on the folder itself and stays with it when it is renamed.
+            lock = _locked(half)
+            try:
+                books = _begin(half, plan, disk)
+                _require_new(folder)
+                disk.move(half, folder)
+                disk.sync_folder(folder.parent)
+            except BaseException:
+                os.close(lock)
+                disk.remove(half)
+                raise
+        return cls(Books(folder, disk, books.manifest, ()), lock, Recovery())
+
+    @classmethod
+    def open(cls, folder: Path, disk: Disk | None = None) -> Self:
+        """Open a session and bring in order what a crash left.
+
+        Raises :class:`NotFoundError` where there is none, :class:`ConflictError`
+        ``session-busy`` while another process has it, :class:`InputError` for a damaged one.
+        """
+        disk = Disk() if disk is None else disk
+        lock = _locked(folder)
+        try:
+            with disk_errors(folder):
+                books, recovery = recover_books(read_books(folder, disk))
+        except BaseException:
+            os.close(lock)
+            raise
+        return cls(books, lock, recovery)
+
+    @property
+    def folder(self) -> Path:
+        """Where it lies."""
+        return self.books.folder
+
+    @property
+    def manifest(self) -> SessionFile:
+        """What ``session.json`` says."""
+        return self.books.manifest
+
+    @property
+    def next_number(self) -> int:
+        """The number the next capture gets."""
+        return max((record.number for record in self.books.records), default=0) + 1
+
+    @property
+    def next_instant(self) -> int:
+        """The number of the next capture's first instant: the name of its pictures."""
+        ends = [record.first_instant + record.shots for record in self.books.records]
+        return max(ends, default=1)
+
+    def committed(self, capture_id: str) -> CaptureRecord | None:
+        """The record of a committed capture, None when there is none of that id.
+
+        Raises :class:`ConflictError` ``capture-unknown`` for one that was interrupted, and
+        :class:`InputError` for what is no id.
+        """
+        if not CAPTURE_ID.fullmatch(capture_id):
+            raise InputError(
+                "capture-id",
+                f"{capture_id!r} is no capture id",
+                "give 1 to 64 letters, digits, '-', '_' or '.', a letter or digit first",
+            )
+        lost = self.books.interrupted(capture_id)
+        if lost is not None:
+            told = "may have fired" if lost.fate == "unknown" else "fired"
+            raise ConflictError(
+                "capture-unknown",
+                f"capture {capture_id} was interrupted after it {told} ({lost.why})",
+                "take a new capture under another id",
+            )
+        return self.books.committed(capture_id)
+
+    def tidy(self, known: InterruptedEntry | None = None) -> None:
+        """Bring in order what a failed write of this very process left behind.
+
+        What the disk says counts, not what this process believes: the failure may have come
+        after the capture was committed. ``known`` as for :func:`recover_books`.
+        """
+        if (self.folder / places.INCOMPLETE).exists():
+            with disk_errors(self.folder):
+                on_disk = read_books(self.folder, self.books.disk)
+                self.books, self.recovery = recover_books(on_disk, known)
+
+    def require_space(self, least_mb: float) -> None:
+        """Raise :class:`ConflictError` ``disk-full`` when less is free."""
+        with disk_errors(self.folder):
+            free_mb = self.books.disk.free_bytes(self.folder) / MEGABYTE
+        if free_mb < least_mb:
+            raise ConflictError(
+                "disk-full",
+                f"{free_mb:.0f} MB are free for {self.folder}, {least_mb:.0f} MB are asked for",
+                "free some, lower min_free_mb, or choose a session on another disk",
+            )
+
+    def close(self) -> None:
+        """Let go of it; closing twice changes nothing."""
+        if self._lock is not None:
+            os.close(self._lock)
+            self._lock = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+def session_folder(root: Path, subject: str, now: datetime | None = None) -> Path:
+    """The usual place for a new session: ``sub-<subject>/ses-<yyyymmddThhmmss>``."""
+    now = datetime.now(UTC).astimezone() if now is None else now
+    name = re.sub(r"[^A-Za-z0-9]+", "", subject) or "unnamed"
+    return root / f"sub-{name}" / f"ses-{now:%Y%m%dT%H%M%S}"
+
+
+def _remove_stale(folder: Path, disk: Disk) -> None:
+    """Remove beginnings of this session that a crash left; those being made are locked."""
+    for half in folder.parent.glob(f".{glob.escape(folder.name)}.*.part"):
+        with contextlib.suppress(ConflictError, NotFoundError):
+            lock = _locked(half)
+            disk.remove(half)
+            os.close(lock)
+
+
+def _begin(half: Path, plan: SessionPlan, disk: Disk) -> Books:
+    for path, data in plan.rig_files.items():
+        disk.make_folder((half / path).parent)
+        disk.write(half / path, data)
+        disk.sync_folder((half / path).parent)
+    manifest = SessionFile(
+        schema="rigwright.session/1",
+        rigwright=program_version(),
+        session_id=secrets.token_hex(16),
+        subject=plan.subject,
+        operator=plan.operator,
+        created_at=datetime.now(UTC).astimezone().isoformat(timespec="seconds"),
+        station=plan.station,
+        rig_sha256=plan.rig_sha256,
+        rig=[entry(path, data) for path, data in plan.rig_files.items()],
+        captures=[],
+        tables=[],
+        interrupted=[],
+        digest="",
+    )
+    books = write_books(Books(half, disk, manifest, ()))
+    disk.remove(half / places.INCOMPLETE)
+    return books
+
+
+def _require_new(folder: Path) -> None:
+    if folder.exists() or folder.is_symlink():
+        raise ConflictError(
+            "session-exists", f"{folder} is there already", "open it, or choose a new folder"
+        )
+
+
+def _locked(folder: Path) -> int:
+    """The kernel's lock on the folder itself: no file of its own that a copy would carry along."""
+    try:
+        handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+    except (FileNotFoundError, NotADirectoryError) as error:
+        raise NotFoundError(
+            "session-not-found", f"{folder} is not a session", "give a session's folder"
+        ) from error
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        os.close(handle)
+        raise ConflictError(
+            "session-busy",
+            f"another process works on the session {folder}",
+            "wait for it, or stop it",
+        ) from None
+    return handle

@@ -1,0 +1,64 @@
+"""Measured delays written back to a station file, which otherwise stays as its author left it."""
+
+from __future__ import annotations
+
+import os
+import secrets
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from common.errors import InputError
+from rig.acquisition.station.stationfile import parse_station
+
+
+@dataclass(frozen=True)
+class Timing:
+    """What was found out about one camera: its lag, and the delay that makes up for it."""
+
+    delay_us: float
+    expected_lag_us: float
+
+
+def with_timings(text: str, timings: Mapping[str, Timing], name: str = "station") -> str:
+    """The station file ``text`` with new delays by camera name; comments and order stay.
+
+    Raises :class:`InputError` for a name that the file does not have.
+    """
+    import tomlkit
+
+    station = parse_station(text, name)
+    for camera in timings:
+        station.camera(camera)
+    document = tomlkit.parse(text)
+    for table in document["camera"]:
+        found = timings.get(str(table["name"]))
+        if found is not None:
+            table["delay_us"] = round(found.delay_us, 1)
+            table["expected_lag_us"] = round(found.expected_lag_us, 1)
+    written = tomlkit.dumps(document)
+    parse_station(written, name)
+    return written
+
+
+def write_timings(path: Path, timings: Mapping[str, Timing]) -> None:
+    """The same in the file itself: replaced whole, or left as it was.
+
+    Raises :class:`InputError` when it cannot be read or written.
+    """
+    half = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
+    try:
+        text = with_timings(path.read_text(encoding="utf-8"), timings, path.name)
+        with half.open("w", encoding="utf-8") as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+        half.chmod(path.stat().st_mode & 0o7777)
+        half.replace(path)
+    except OSError as error:
+        half.unlink(missing_ok=True)
+        raise InputError(
+            "station-unwritable",
+            f"cannot write the station file {path} ({(error.strerror or '').lower()})",
+            "make it and its folder writable",
+        ) from error

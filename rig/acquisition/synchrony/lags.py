@@ -1,0 +1,106 @@
+"""Each camera's shutter lag from several captures, and the delays that make up for the lags."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from statistics import median
+
+from common.errors import InputError
+from rig.acquisition.station.delays import Timing
+from rig.acquisition.station.spec import Station
+from rig.acquisition.synchrony.verdict import Evidence
+
+NORMAL = 1.4826
+"""Median absolute deviation to standard deviation, for a normal distribution."""
+
+
+@dataclass(frozen=True)
+class LagEstimate:
+    """The median lag of ``count`` pictures.
+
+    ``jitter_us``: their robust standard deviation; ``uncertainty_us``: the half width within
+    which the median is known; ``source``: ``optical`` or ``timestamps``.
+    """
+
+    camera: str
+    lag_us: float
+    jitter_us: float
+    uncertainty_us: float
+    count: int
+    exposure_us: float
+    source: str
+
+
+def estimate_lags(captures: Sequence[Evidence]) -> dict[str, LagEstimate]:
+    """One estimate per camera that showed its lag; the timing board is believed before stamps."""
+    optical: dict[str, list[tuple[float, float, float]]] = {}
+    stamped: dict[str, list[tuple[float, float, float]]] = {}
+    for evidence in captures:
+        for r in evidence.optical.readings if evidence.optical is not None else ():
+            if math.isfinite(r.lag_us):
+                figures = (r.lag_us, r.lag_uncertainty_us, r.exposure_us)
+                optical.setdefault(r.camera, []).append(figures)
+        for f in evidence.stamps.frames:
+            if math.isfinite(f.lag_us):
+                figures = (f.lag_us, f.lag_uncertainty_us, f.exposure_us)
+                stamped.setdefault(f.camera, []).append(figures)
+    names = sorted(optical.keys() | stamped.keys())
+    return {
+        name: _estimate(name, optical[name], "optical")
+        if name in optical
+        else _estimate(name, stamped[name], "timestamps")
+        for name in names
+    }
+
+
+def _estimate(name: str, figures: Sequence[tuple[float, float, float]], source: str) -> LagEstimate:
+    lags = [figure[0] for figure in figures]
+    middle = median(lags)
+    jitter = NORMAL * median(abs(lag - middle) for lag in lags) if len(lags) > 1 else math.nan
+    known = max(figure[1] for figure in figures)
+    scatter = 0.0 if math.isnan(jitter) else 3.0 * jitter / math.sqrt(len(lags))
+    exposure = median(figure[2] for figure in figures)
+    return LagEstimate(name, middle, jitter, known + scatter, len(lags), exposure, source)
+
+
+def new_timings(station: Station, estimates: Mapping[str, LagEstimate]) -> dict[str, Timing]:
+    """Delays under which all exposures' middles (or starts) coincide; the smallest one is 0.
+
+    Cameras on no output keep theirs. Raises :class:`InputError` when a camera on an output has
+    no estimate, because the others would be moved away from it.
+    """
+    wired = [camera for camera in station.cameras if camera.output is not None]
+    dumb = [camera.name for camera in wired if camera.name not in estimates]
+    if dumb or not wired:
+        which = ", ".join(dumb) or "no camera on an output"
+        raise InputError(
+            "lag-unknown",
+            f"the lag of {which} could not be measured",
+            "put the timing board where every camera sees it, or use cameras with time stamps",
+        )
+    # Middles can be brought together only where every exposure's length is known.
+    middles = all(math.isfinite(estimates[camera.name].exposure_us) for camera in wired)
+    late = {camera.name: _late_us(estimates[camera.name], middles) for camera in wired}
+    latest = max(late.values())
+    return {
+        name: Timing(latest - value, max(0.0, estimates[name].lag_us))
+        for name, value in late.items()
+    }
+
+
+def _late_us(estimate: LagEstimate, middles: bool) -> float:
+    """From the edge to the middle of the exposure, or to its start."""
+    return estimate.lag_us + (estimate.exposure_us / 2.0 if middles else 0.0)
+
+
+def with_new_timings(station: Station, timings: Mapping[str, Timing]) -> Station:
+    """The station with these delays and lags."""
+    cameras = []
+    for camera in station.cameras:
+        found = timings.get(camera.name)
+        if found is not None:
+            camera = replace(camera, delay_us=found.delay_us, expected_lag_us=found.expected_lag_us)
+        cameras.append(camera)
+    return replace(station, cameras=tuple(cameras))

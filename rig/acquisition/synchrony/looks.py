@@ -1,0 +1,98 @@
+"""A glance at each picture: can it be read, how large is it, is there anything on it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from io import BytesIO
+from typing import cast
+
+import numpy as np
+
+from rig.acquisition.cameras.base import Frame, Image
+from rig.acquisition.synchrony.faults import Fault, FaultKind
+from rig.acquisition.synchrony.take import Pairing
+
+BLACK_SHARE = {8: 1.0 / 16.0, 16: 1.0 / 50.0}
+"""A picture whose 99.9th percentile stays below this share of full scale shows nothing, by bits.
+
+8 bits are gamma coded, 16 bits mostly linear and moved up to fill their range. The noise and
+offset of a dark frame stay below, the lit side of a face far above.
+"""
+
+STRIDE = 3
+"""Every third row and column decide about blackness: enough of any face, a ninth of the work."""
+
+READABLE_TYPES = ("image/jpeg", "image/png", "image/tiff")
+"""What is read to be looked at. Raw files are filed as they came."""
+
+
+@dataclass(frozen=True)
+class Look:
+    """What a glance showed. ``size_px`` (width, height) None where it could not be read."""
+
+    size_px: tuple[int, int] | None
+    black: bool = False
+    readable: bool = True
+
+
+def is_raw(frame: Frame) -> bool:
+    """Whether a frame is a file of a kind that is filed beside the pictures, unread."""
+    return frame.encoded is not None and frame.media_type not in READABLE_TYPES
+
+
+def look_at(frame: Frame) -> Look:
+    """Glance at one picture."""
+    if frame.pixels is not None:
+        height, width = frame.pixels.shape[:2]
+        return Look((width, height), _black(frame.pixels))
+    if frame.encoded is None:
+        return Look(None, readable=False)
+    if is_raw(frame):
+        return Look(None)
+    return _look_at_file(frame.encoded)
+
+
+def _look_at_file(data: bytes) -> Look:
+    import cv2
+    from PIL import Image as Pictures
+
+    # An eighth each way is enough to see whether there is anything, and decodes in no time.
+    flags = cv2.IMREAD_REDUCED_GRAYSCALE_8 | cv2.IMREAD_IGNORE_ORIENTATION
+    try:
+        size = Pictures.open(BytesIO(data)).size
+        pixels = cv2.imdecode(np.frombuffer(data, np.uint8), flags)
+    except (OSError, SyntaxError, ValueError, cv2.error):
+        # Each damaged file makes the libraries throw something else, or return nothing.
+        return Look(None, readable=False)
+    if pixels is None:
+        return Look(None, readable=False)
+    if data[:2] == b"\xff\xd8" and b"\xff\xd9" not in data[-4096:]:
+        # The decoder fills what is missing of a JPEG that was cut off with grey.
+        return Look(size, readable=False)
+    return Look(size, _black(cast(Image, pixels)))
+
+
+def _black(pixels: Image) -> bool:
+    depth = np.iinfo(pixels.dtype)
+    thin = pixels[::STRIDE, ::STRIDE]
+    return bool(np.percentile(thin, 99.9) < BLACK_SHARE[depth.bits] * float(depth.max))
+
+
+def look_faults(pairing: Pairing, size_px: tuple[int, int] | None) -> list[Fault]:
+    """What is wrong with the pictures of one camera that were given to shots."""
+    faults = []
+    for one in pairing.pairs:
+        look = look_at(one.frame)
+        name, shot = pairing.camera, one.shot
+        which = f"{name}: the picture of shot {shot}"
+        if not look.readable:
+            text = f"{which} cannot be read"
+            faults.append(Fault(FaultKind.UNREADABLE, text, name, shot))
+        if look.black:
+            text = f"{which} is black; check the flash, the lens cap and the exposure"
+            faults.append(Fault(FaultKind.BLACK, text, name, shot))
+        if look.size_px is not None and size_px is not None and look.size_px != size_px:
+            is_, should = "{} x {}".format(*look.size_px), "{} x {}".format(*size_px)
+            text = f"{which} has {is_} pixels, {should} are expected"
+            faults.append(Fault(FaultKind.WRONG_SIZE, text, name, shot))
+    return faults

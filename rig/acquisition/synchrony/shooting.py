@@ -1,0 +1,73 @@
+"""What came of one firing, in memory: everything that pairing, evidence and filing need."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+
+from rig.acquisition.cameras.base import CameraInfo, CameraSettings, ClockSample
+from rig.acquisition.station.spec import CameraPlan
+from rig.acquisition.synchrony.faults import Fault
+from rig.acquisition.synchrony.take import Pairing, Take
+from rig.acquisition.trigger.box import ArmRequest, FireReport
+
+
+@dataclass(frozen=True, eq=False)
+class CameraPart:
+    """One camera's part: who it is, what it was set to, what it gave and what that means."""
+
+    plan: CameraPlan
+    info: CameraInfo
+    settings: CameraSettings
+    """What it really had, as far as it can tell."""
+    take: Take
+    pairing: Pairing
+    raws: Pairing | None = None
+    """Raw files that came beside the pictures, paired by themselves."""
+    clock_samples: tuple[ClockSample, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Shooting:
+    """One firing. ``fired_at`` is wall-clock time of the first shot, with its offset.
+
+    ``report`` is None for a station without a box. ``shots_done`` is how many shots there were.
+    ``absent``: cameras of the station that took no part. ``faults`` are those of no camera's
+    pictures: cameras not ready, shots not fired.
+    """
+
+    capture_id: str
+    shots: int
+    interval_us: float
+    fired_at: datetime
+    fired_host_ns: int
+    request: ArmRequest | None
+    report: FireReport | None
+    shots_done: int
+    parts: tuple[CameraPart, ...]
+    absent: tuple[str, ...] = ()
+    faults: tuple[Fault, ...] = ()
+
+    @property
+    def all_faults(self) -> tuple[Fault, ...]:
+        """The faults of the whole, those of the pictures included."""
+        found: list[Fault] = list(self.faults)
+        for part in self.parts:
+            found += part.pairing.faults
+        return tuple(found)
+
+    @property
+    def whole(self) -> bool:
+        """Whether every camera of the station gave a sound picture of every shot asked for."""
+        return not self.absent and all(fault.harmless for fault in self.all_faults)
+
+    def missing(self) -> Mapping[str, Sequence[int]]:
+        """Shots (from 1) without a picture, by camera; cameras that have all are left out."""
+        wanted = range(1, self.shots + 1)
+        lost = {
+            part.plan.name: [s for s in wanted if part.pairing.pair(s) is None]
+            for part in self.parts
+        }
+        lost.update({name: list(wanted) for name in self.absent})
+        return {name: shots for name, shots in lost.items() if shots}

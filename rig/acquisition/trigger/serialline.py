@@ -1,0 +1,183 @@
+"""A serial line held by one owner: opened, locked, read and written, lost.
+
+Any pyserial url will do: a device's path, ``socket://``, ``rfc2217://``, ``spy://``,
+``loop://``. A write that returns proves nothing (on a closed socket it succeeds); only an answer
+does.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import os
+import re
+import select
+import sys
+import tempfile
+import time
+from contextlib import suppress
+from pathlib import Path
+
+import serial
+
+from common.errors import DeviceError
+
+LINE_ERRORS = (serial.SerialException, OSError, TypeError)
+"""What pyserial raises when a port goes: its own error, plain OSError from ``in_waiting``, and
+TypeError where the handle was closed under it."""
+
+_SLICE_S = 0.005
+_WRITE_PATIENCE_S = 0.5
+
+
+class LineLostError(Exception):
+    """The port is gone: unplugged, closed by the other side, or it takes nothing any more."""
+
+
+def bare_url(url: str) -> str:
+    """The address without ``spy://`` and without options."""
+    return re.sub(r"^spy://|\?.*$", "", url)
+
+
+def is_device_path(url: str) -> bool:
+    """Whether the address is a path of this computer."""
+    return "://" not in bare_url(url)
+
+
+class PortLock:
+    """The kernel's lock on a port, by name: a process that dies lets go.
+
+    Raises :class:`~common.errors.DeviceError` ``device/trigger-busy`` that says who holds it.
+    """
+
+    def __init__(self, url: str) -> None:
+        name = bare_url(url)
+        # Two names of one port are one lock: the stable link and what it points to.
+        real = os.path.realpath(name) if is_device_path(url) else name
+        digest = hashlib.sha256(real.encode()).hexdigest()[:16]
+        path = Path(tempfile.gettempdir()) / f"rigwright-trigger-{digest}.lock"
+        self._handle = _lock_file(path)
+        try:
+            fcntl.flock(self._handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            holder = os.pread(self._handle, 200, 0).decode(errors="replace").strip()
+            os.close(self._handle)
+            raise DeviceError(
+                "trigger-busy",
+                f"the trigger box at {name} is held by {holder or 'another program'}",
+                "end that program, or let it do the work",
+            ) from None
+        os.ftruncate(self._handle, 0)
+        program = Path(sys.argv[0]).name or "python"
+        os.pwrite(self._handle, f"process {os.getpid()} ({program})\n".encode(), 0)
+
+    def release(self) -> None:
+        """Let go."""
+        os.close(self._handle)
+
+
+def _lock_file(path: Path) -> int:
+    """The file, for all users.
+
+    A kernel that protects shared folders lets nobody create over another's file, only open it.
+    """
+    while True:
+        with suppress(FileNotFoundError):
+            return os.open(path, os.O_RDWR | os.O_CLOEXEC)
+        with suppress(FileExistsError):
+            handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC)
+            os.fchmod(handle, 0o666)
+            return handle
+
+
+class SerialLine:
+    """One open port. Used by one thread; :meth:`wake` from any.
+
+    Raises :class:`~common.errors.DeviceError` ``device/trigger-gone`` or
+    ``device/trigger-busy`` when it cannot be opened, :class:`LineLostError` afterwards.
+    """
+
+    def __init__(self, url: str, baud: int, wake_handle: int) -> None:
+        self._wake_handle = wake_handle
+        lock = PortLock(url)
+        try:
+            self._port = _open_port(url, baud)
+        except BaseException:
+            lock.release()
+            raise
+        self._lock = lock
+        try:
+            self._handle = self._port.fileno()
+        except (OSError, AttributeError):
+            self._handle = -1  # rfc2217:// and loop:// cannot be waited on
+            self._port.timeout = _SLICE_S
+
+    def close(self) -> None:
+        """Let go of port and lock, whatever state they are in."""
+        connection = getattr(self._port, "_socket", None)
+        with suppress(*LINE_ERRORS):
+            self._port.close()
+        if connection is not None:
+            # pyserial does not get to closing a socket whose other side has gone.
+            connection.close()
+        self._lock.release()
+
+    def send(self, data: bytes) -> None:
+        """Write all of it."""
+        try:
+            self._port.write(data)
+        except LINE_ERRORS as error:
+            raise LineLostError(str(error)) from error
+
+    def receive(self, timeout_s: float, wakeable: bool) -> bytes:
+        """What comes next; nothing after ``timeout_s``, or when woken."""
+        try:
+            if self._handle >= 0:
+                return self._receive_ready(timeout_s, wakeable)
+            return self._receive_sliced(timeout_s, wakeable)
+        except LINE_ERRORS as error:
+            raise LineLostError(str(error)) from error
+
+    def _receive_ready(self, timeout_s: float, wakeable: bool) -> bytes:
+        handles = [self._handle, self._wake_handle] if wakeable else [self._handle]
+        ready, _, _ = select.select(handles, [], [], max(timeout_s, 0.0))
+        if self._wake_handle in ready:
+            os.read(self._wake_handle, 4096)
+        return self._port.read(4096) if self._handle in ready else b""
+
+    def _receive_sliced(self, timeout_s: float, wakeable: bool) -> bytes:
+        deadline = time.monotonic() + timeout_s
+        while True:
+            data: bytes = self._port.read(1)
+            if data or time.monotonic() >= deadline:
+                return data
+            if wakeable and select.select([self._wake_handle], [], [], 0.0)[0]:
+                os.read(self._wake_handle, 4096)
+                return b""
+
+
+def _open_port(url: str, baud: int) -> serial.SerialBase:
+    # rfc2217:// knows no time-out for writing and refuses to be given one.
+    patience_s = None if bare_url(url).startswith("rfc2217://") else _WRITE_PATIENCE_S
+    try:
+        return serial.serial_for_url(
+            url, baudrate=baud, timeout=0, write_timeout=patience_s, exclusive=True
+        )
+    except ValueError as error:
+        raise DeviceError(
+            "trigger-gone",
+            f"{url!r} is no address of a port ({error})",
+            "give a path such as /dev/serial/by-id/..., or socket://host:port",
+        ) from error
+    except LINE_ERRORS as error:
+        if "exclusively lock" in str(error):
+            raise DeviceError(
+                "trigger-busy",
+                f"the port {bare_url(url)} is held by another program",
+                "end that program, or let it do the work",
+            ) from error
+        raise DeviceError(
+            "trigger-gone",
+            f"the port {bare_url(url)} cannot be opened ({error})",
+            "plug the box in and check the port's name and your right to use it",
+        ) from error

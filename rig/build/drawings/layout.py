@@ -1,0 +1,90 @@
+"""How the views of a rig lie on a sheet: third-angle projection at the largest scale that fits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from geometry.arrays import Floats
+from common.errors import InputError
+from rig.build.drawings.frame import (
+    A3_LANDSCAPE_MM,
+    BLOCK_MM,
+    MARGIN_MM,
+)
+
+DENOMINATORS = (1, 2, 2.5, 5, 7.5, 10, 12.5, 15, 20, 25, 30, 40, 50, 75, 100, 150, 200, 500, 1000)
+EDGE_MM = 24.0
+"""Room at the outer sides of the views, for ordinates."""
+
+BETWEEN_MM = 36.0
+
+
+@dataclass(frozen=True)
+class View:
+    """How the rig is looked at: axes to the right, up and towards the viewer, in the rig."""
+
+    title: str
+    right: tuple[float, float, float]
+    up: tuple[float, float, float]
+
+    @property
+    def axes(self) -> Floats:
+        """Rows right, up and towards the viewer, (3, 3)."""
+        return np.array([self.right, self.up, np.cross(self.right, self.up)])
+
+
+FRONT = View("Front: from behind the cameras", (1, 0, 0), (0, 0, 1))
+TOP = View("Top", (1, 0, 0), (0, 1, 0))
+SIDE = View("Right side", (0, 1, 0), (0, 0, 1))
+
+
+@dataclass(frozen=True, eq=False)
+class Placed:
+    """A view on the paper: paper = ``origin_mm`` + (in the view - ``low_mm``) / denominator."""
+
+    view: View
+    low_mm: Floats
+    high_mm: Floats
+    origin_mm: Floats
+    denominator: float
+
+    def paper(self, points_rig_mm: Floats) -> Floats:
+        """Points (N, 3) of the rig on the paper, (N, 2)."""
+        return self.flat(np.asarray(points_rig_mm) @ self.view.axes[:2].T)
+
+    def flat(self, points_view_mm: Floats) -> Floats:
+        """Points (..., 2) of the view on the paper."""
+        return np.asarray((points_view_mm - self.low_mm) / self.denominator + self.origin_mm)
+
+    @property
+    def size_mm(self) -> Floats:
+        """Width and height on the paper, (2,)."""
+        return np.asarray((self.high_mm - self.low_mm) / self.denominator)
+
+
+def arranged(low: Floats, high: Floats) -> tuple[Placed, Placed, Placed]:
+    """Front, top above it and side right of it, at the largest scale that fits."""
+    width, depth, height = high - low
+    across = A3_LANDSCAPE_MM[0] - 2.0 * MARGIN_MM - 2.0 * EDGE_MM - BETWEEN_MM
+    upwards = A3_LANDSCAPE_MM[1] - 2.0 * MARGIN_MM - BLOCK_MM[1] - 2.0 * EDGE_MM - BETWEEN_MM - 6.0
+    for n in DENOMINATORS:
+        if (width + depth) / n <= across and (height + depth) / n <= upwards:
+            break
+    else:
+        raise InputError(
+            "drawing-size", "the rig is too large for a drawing", "check the plan's positions"
+        )
+    left = MARGIN_MM + EDGE_MM + (across - (width + depth) / n) / 2.0
+    base = MARGIN_MM + BLOCK_MM[1] + EDGE_MM + (upwards - (height + depth) / n) / 2.0
+    origins = (
+        (left, base),
+        (left, base + height / n + BETWEEN_MM),
+        (left + width / n + BETWEEN_MM, base),
+    )
+    front, top, side = (
+        Placed(view, view.axes[:2] @ low, view.axes[:2] @ high, np.array(origin), float(n))
+        for view, origin in zip((FRONT, TOP, SIDE), origins, strict=True)
+    )
+    return front, top, side

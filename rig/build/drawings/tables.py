@@ -1,0 +1,106 @@
+"""Tables on drawings, and sheets full of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rig.build.drawings.frame import (
+    A4_MM,
+    BLOCK_MM,
+    MARGIN_MM,
+    Content,
+    fitted,
+)
+from rig.build.drawings.items import (
+    Item,
+    Line,
+    Text,
+)
+from rig.build.drawings.pdf import text_width_mm
+
+ROW_MM = 4.6
+TEXT_MM = 2.1
+PAD_MM = 1.5
+HEAD_MM = 6.0
+WIDEST_CELL_MM = 110.0
+NUMBER_LIKE = frozenset("0123456789.-+×° ∞–")
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table with a heading."""
+
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+
+    def height_mm(self) -> float:
+        """Height with its heading."""
+        return HEAD_MM + ROW_MM * (len(self.rows) + 1)
+
+    def widths_mm(self, most_mm: float) -> list[float]:
+        """Widths of the columns: what their words need, less when that is more than there is."""
+        need = [
+            max(
+                text_width_mm(self.columns[k], TEXT_MM, bold=True),
+                *(text_width_mm(row[k], TEXT_MM) for row in self.rows),
+                0.0,
+            )
+            + 2.0 * PAD_MM
+            for k in range(len(self.columns))
+        ]
+        need = [min(width, WIDEST_CELL_MM) for width in need]
+        over = sum(need) - most_mm
+        if over > 0.0:
+            spare = [max(0.0, width - 14.0) for width in need]
+            share = min(1.0, over / max(sum(spare), 1e-9))
+            need = [width - share * room for width, room in zip(need, spare, strict=True)]
+        return need
+
+
+def table_items(table: Table, left: float, top: float, most_mm: float) -> list[Item]:
+    """A table whose upper left corner is there."""
+    widths = table.widths_mm(most_mm)
+    edges = left + np.concatenate([[0.0], np.cumsum(widths)])
+    items: list[Item] = [Text(table.title, left, top - 3.2, 2.6, bold=True)]
+    y = top - HEAD_MM
+    for index, row in enumerate((table.columns, *table.rows)):
+        base = y - ROW_MM + 1.3
+        for k, words in enumerate(row):
+            right = index > 0 and bool(words) and set(words) <= NUMBER_LIKE
+            x = edges[k + 1] - PAD_MM if right else edges[k] + PAD_MM
+            anchor = "end" if right else "start"
+            cell = Text(words, float(x), base, TEXT_MM, anchor, bold=index == 0)
+            items.append(fitted(cell, widths[k] - 2.0 * PAD_MM + 0.1))
+        y -= ROW_MM
+        style = "mark" if index == 0 else "thin"
+        items.append(Line(np.array([[left, y], [edges[-1], y]]), style))
+    items.append(Line(np.array([[left, top - HEAD_MM], [edges[-1], top - HEAD_MM]]), "mark"))
+    return items
+
+
+def table_sheets(
+    tables: Sequence[Table], title: str, size_mm: tuple[float, float] = A4_MM
+) -> list[Content]:
+    """Tables one below the other on as many sheets as they need."""
+    width, height = size_mm
+    bottom = MARGIN_MM + BLOCK_MM[1] + 6.0
+    most = width - 2.0 * MARGIN_MM - 10.0
+    pages: list[list[Item]] = [[]]
+    y = height - MARGIN_MM - 6.0
+    for table in tables:
+        rest = table
+        while rest.rows:
+            room = int((y - bottom - HEAD_MM) // ROW_MM) - 1
+            if room < min(3, len(rest.rows)):
+                pages.append([])
+                y = height - MARGIN_MM - 6.0
+                continue
+            part = Table(rest.title, rest.columns, rest.rows[:room])
+            pages[-1] += table_items(part, MARGIN_MM + 5.0, y, most)
+            y -= part.height_mm() + 6.0
+            rest = Table(f"{table.title} (continued)", table.columns, rest.rows[room:])
+    return [Content(title, size_mm, tuple(items), to_scale=False) for items in pages if items]

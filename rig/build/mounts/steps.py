@@ -1,0 +1,107 @@
+"""The assembly steps: numbered sentences that name members, lengths, holes and settings."""
+
+from __future__ import annotations
+
+from rig.build.mounts.settings import (
+    CameraMount,
+    Setting,
+)
+from rig.build.mounts.structure import (
+    Joint,
+    Member,
+    Plate,
+    Structure,
+    Wedge,
+)
+
+
+def assembly_steps(structure: Structure, mounts: tuple[CameraMount, ...]) -> tuple[str, ...]:
+    """What to do, one step after the other."""
+    steps = [_cut(structure.members)] if structure.members else []
+    steps += [_drill(plate) for plate in structure.plates]
+    if structure.wedges:
+        steps.append(f"Print the wedges: {', '.join(wedge.id for wedge in structure.wedges)}.")
+    own = {m.name: {part for part in m.carried_by if part.startswith(f"{m.name} ")} for m in mounts}
+    of_one = {m.name for m in mounts}.union(*own.values())
+    steps += [f"J{_join(j)[1:]}." for j in structure.joints if not {j.on, j.other} & of_one]
+    steps.append(
+        "Set up the subject's head form or a pointer at the datum, and check that the mount stands "
+        "level and square to it."
+    )
+    for mount in mounts:
+        mine = own[mount.name] | {mount.name}
+        joints = [j for j in structure.joints if {j.on, j.other} & mine]
+        steps.append(f"Hang {mount.name}: {_hang(mount, joints, structure.wedges)}.")
+        steps.append(_set(mount))
+        steps.append(_check(mount))
+    return tuple(f"{k}. {text}" for k, text in enumerate(steps, 1))
+
+
+def _cut(members: tuple[Member, ...]) -> str:
+    pieces = "; ".join(f"{m.id} {m.part} {m.length_mm:.0f} mm" for m in members)
+    return f"Cut to length: {pieces}."
+
+
+def _drill(plate: Plate) -> str:
+    holes = "; ".join(
+        f"{h.label} at {h.x_mm:.1f}, {h.y_mm:.1f} mm, {h.kind} {h.diameter_mm:.1f} mm"
+        + (f" {h.thread}" if h.thread else "")
+        for h in plate.holes
+    )
+    return f"Drill {plate.id} ({plate.material}, {plate.thickness_mm:g} mm): {holes}."
+
+
+def _hang(mount: CameraMount, joints: list[Joint], wedges: tuple[Wedge, ...]) -> str:
+    """The joints of one camera in the order in which they can be made."""
+    wedge = next((w.id for w in wedges if w.camera == mount.name), None)
+    if wedge is None:
+        return "; ".join(_join(joint) for joint in joints)
+    # On its post the wedge hides the camera's screw; the camera leaves the base screws free.
+    first = [_join(j) for j in joints if wedge not in (j.on, j.other)]
+    under = [
+        f"screw {j.other} onto {j.on} from below, the screw's head in the wedge's pocket" + _with(j)
+        for j in joints
+        if j.on == wedge
+    ]
+    last = [
+        f"screw {j.other} onto {j.on} with its camera on it{_where(j)}, by a straight key from "
+        "above" + _with(j)
+        for j in joints
+        if j.other == wedge
+    ]
+    return "; ".join([*first, *under, *last, "plug in the cable last"])
+
+
+def _join(joint: Joint) -> str:
+    angle = "" if joint.angle_deg is None else f", at {joint.angle_deg:.1f} degrees"
+    return f"join {joint.other} to {joint.on}{_where(joint)}{angle}" + _with(joint)
+
+
+def _where(joint: Joint) -> str:
+    return "" if joint.along_mm is None else f", {joint.along_mm:.0f} mm from its start"
+
+
+def _with(joint: Joint) -> str:
+    parts = ", ".join(f"{count} x {part}" for part, count in joint.fasteners.items())
+    return f" with {parts}" if parts else ""
+
+
+def _set(mount: CameraMount) -> str:
+    figures = "; ".join(_value(setting) for setting in mount.settings)
+    if all(setting.step == 0.0 for setting in mount.settings):
+        return (
+            f"Nothing is set on {mount.name}; check its figures as drilled and printed: {figures}."
+        )
+    return f"Set {mount.name}: {figures}."
+
+
+def _value(setting: Setting) -> str:
+    unit = "mm" if setting.unit == "mm" else "degrees"
+    digits = 0 if setting.step >= 1.0 else 1
+    return f"{setting.name} {setting.value:.{digits}f} {unit} (from {setting.measured_from})"
+
+
+def _check(mount: CameraMount) -> str:
+    tapes = "; ".join(f"{t.start} to {t.end} {t.length_mm:.0f} mm" for t in mount.tapes)
+    focus = mount.camera.focus_distance_mm
+    return f"Check {mount.name} with the tape: {tapes}. Focus at {focus:.0f} mm."

@@ -1,0 +1,257 @@
+"""A stub bar across a rail, an arm along the stub towards the subject, a head on the arm.
+
+The frame of the rail where the stub sits: x across (to the right seen from behind the
+cameras), y towards the subject, z along the rail. The stub lies on the rail's front face, the
+arm crosses over or under the stub, the head stands on one of the arm's four faces. The
+plate under the head may be pitched on a pivot joint, where a head alone cannot look so steeply.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from geometry.arrays import Floats
+from geometry.camera import RigCamera
+from rig.catalogue.items import Bracket, Profile
+from rig.build.mounts.kinematics import (
+    frames_along,
+    rotated,
+    standing,
+)
+from rig.build.mounts.settings import (
+    CameraMount,
+    Link,
+    Motion,
+    Setting,
+    shift,
+    turn,
+)
+from rig.build.mounts.solids import (
+    bar,
+    box,
+    carried,
+)
+from rig.build.mounts.structure import (
+    Joint,
+    Member,
+    PlacedPart,
+    Solid,
+)
+from rig.build.mounts.systems.heads import (
+    HeadKind,
+    head_id,
+)
+
+X, Y, Z = np.eye(3)
+FACES: tuple[tuple[str, Floats], ...] = (("top", Z), ("under", -Z), ("right", X), ("left", -X))
+PITCHES_DEG = (0.0, 30.0, -30.0, 60.0, -60.0)
+SHORTEST_ARM_MM = 10.0
+LONGEST_ARM_MM = 900.0
+LONGEST_STUB_MM = 400.0
+STUB_END_MM = 15.0
+"""How far a stub reaches past the last bracket on it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Footing:
+    """Where a head stands: the face of the arm, and how far its plate is pitched up."""
+
+    name: str
+    face: Floats
+    pitch_deg: float
+
+    def rotation(self) -> Floats:
+        """The head's foot in the rail's frame, (3, 3)."""
+        return np.asarray(standing(self.face, Y) @ turn(X, self.pitch_deg))
+
+
+FOOTINGS = tuple(
+    Footing(name if pitch == 0.0 else f"{name} {pitch:+g} degree", face, pitch)
+    for pitch in PITCHES_DEG
+    for name, face in FACES
+)
+"""All ways to put a head on an arm, level plates first."""
+
+
+@dataclass(frozen=True, eq=False)
+class Outrigger:
+    """Sizes of the parts that carry one camera; ``side`` 1: the arm lies over the stub."""
+
+    profile: Profile
+    plate: Bracket
+    corner: Bracket
+    pivot: Bracket
+    t_nut: str
+    screw: str
+    head: HeadKind
+
+    @property
+    def size_mm(self) -> tuple[float, float]:
+        """Width across and height of the profile as it lies: in x and z."""
+        return self.profile.width_mm, self.profile.height_mm
+
+    @property
+    def plate_mm(self) -> tuple[float, float, float]:
+        """Width, length and thickness of the plate under the head."""
+        width, length, thick = self.plate.size_mm or (40.0, 60.0, 5.0)
+        return width, length, thick
+
+    def stub_y_mm(self, rail_depth_mm: float) -> float:
+        """Middle of the stub before the middle of the rail."""
+        return (rail_depth_mm + self.profile.width_mm) / 2.0
+
+    def base(self, foot: Footing) -> Floats:
+        """The head's foot (4, 4) from the front end of the arm's middle line."""
+        _, length, thick = self.plate_mm
+        joint = 0.0 if foot.pitch_deg == 0.0 else self.joint_mm
+        under = (self._half_along(foot.face) + joint) * foot.face - length / 2.0 * Y
+        rotation = foot.rotation()
+        return rotated(rotation, under + thick * rotation[:, 2])
+
+    @property
+    def joint_mm(self) -> float:
+        """Height of a pivot joint, from the arm to its axis."""
+        return (self.pivot.size_mm or (20.0, 40.0, 20.0))[1]
+
+    def _half_along(self, face: Floats) -> float:
+        width, height = self.size_mm
+        return width / 2.0 if abs(face[0]) > 0.5 else height / 2.0
+
+    def arm_from_stub(self, side: int) -> Floats:
+        """The stub's middle to the arm's middle line at the stub's front face, (4, 4)."""
+        return shift(np.array([0.0, self.profile.width_mm / 2.0, side * self.profile.height_mm]))
+
+    def links(
+        self, rail_depth_mm: float, side: int, foot: Footing, camera: RigCamera
+    ) -> tuple[Link, ...]:
+        """From the rail's frame, where the stub's middle is at z = 0, to the camera."""
+        return (
+            Link(shift(self.stub_y_mm(rail_depth_mm) * Y), Motion.SLIDE, X, "across"),
+            Link(self.arm_from_stub(side), Motion.SLIDE, Y, "reach"),
+            *self.head.links(self.base(foot), camera),
+        )
+
+    def settings(self, angles_deg: Floats, step_mm: float, rail: str) -> tuple[Setting, ...]:
+        """Across and reach at 0, and the head's angles."""
+        across = Setting(
+            "across", "mm", 0.0, step_mm, -LONGEST_STUB_MM, LONGEST_STUB_MM,
+            f"the middle slot of {rail} to the middle slot of the arm, right positive seen from "
+            "behind",
+        )  # fmt: skip
+        reach = Setting(
+            "reach", "mm", 100.0, step_mm, SHORTEST_ARM_MM, LONGEST_ARM_MM,
+            "the front face of the stub to the front end of the arm",
+        )  # fmt: skip
+        return (across, reach, *self.head.settings(angles_deg))
+
+
+@dataclass(frozen=True, eq=False)
+class Hung:
+    """One camera's outrigger in its place: ``rig_from_rail`` (4, 4) where its stub sits."""
+
+    mount: CameraMount
+    rail: str
+    rig_from_rail: Floats
+    rail_size_mm: tuple[float, float]
+    side: int
+    foot: Footing
+    parts: Outrigger
+
+    @property
+    def stub_id(self) -> str:
+        """Id of the stub."""
+        return f"{self.mount.name} stub"
+
+    @property
+    def arm_id(self) -> str:
+        """Id of the arm."""
+        return f"{self.mount.name} arm"
+
+    def arm_front(self) -> Floats:
+        """Frame (4, 4) of the front end of the arm's middle line, y along the arm."""
+        frames = frames_along(self.mount.chain, self.mount.values())
+        return np.asarray(frames[-5] @ np.linalg.inv(self.mount.chain[-4].transform))
+
+    def members(self) -> tuple[Member, Member]:
+        """Stub and arm, cut to whole millimetres."""
+        values, part = self.mount.values(), self.parts.profile
+        at, front = self.rig_from_rail, self.arm_front()
+        stub_y = self.parts.stub_y_mm(self.rail_size_mm[1])
+        half_rail, half_arm = self.rail_size_mm[0] / 2.0, part.width_mm / 2.0
+        ends = (
+            min(-half_rail, values["across"] - half_arm) - STUB_END_MM,
+            max(half_rail, values["across"] + half_arm) + STUB_END_MM,
+        )
+        low = float(np.floor(ends[0]))
+        stub_axis = np.array([[low, stub_y, 0.0], [low + np.ceil(ends[1] - low), stub_y, 0.0]])
+        length = np.ceil(values["reach"] + part.width_mm - 1e-6)
+        end = front[:3, 3]
+        arm_axis = np.array([end - length * front[:3, 1], end])
+        size = (part.width_mm, part.height_mm)
+        return (
+            Member(self.stub_id, part.id, "stub", carried(at, stub_axis), at[:3, 1], size),
+            Member(self.arm_id, part.id, "arm", arm_axis, front[:3, 0], size),
+        )
+
+    def placed(self) -> tuple[PlacedPart, ...]:
+        """Plate and head."""
+        foot = self.arm_front() @ self.parts.base(self.foot)
+        plate = foot @ shift(np.array([0.0, 0.0, -self.parts.plate_mm[2]]))
+        name = self.mount.name
+        return (
+            PlacedPart(f"{name} plate", self.parts.plate.id, "head plate", plate, name),
+            PlacedPart(head_id(name), self.parts.head.part.id, "head", foot, name),
+        )
+
+    def solids(self) -> tuple[Solid, ...]:
+        """Stub, arm, plate and head."""
+        stub, arm = self.members()
+        plate = self.placed()[0]
+        width, length, thick = self.parts.plate_mm
+        half = np.array([width / 2.0, length / 2.0, 0.0])
+        return (
+            bar(stub.id, "member", stub.axis_mm[0], stub.axis_mm[1], stub.across, stub.size_mm),
+            bar(arm.id, "member", arm.axis_mm[0], arm.axis_mm[1], arm.across, arm.size_mm),
+            box(
+                plate.id, "bracket", plate.rig_from_part, -half, half + np.array([0.0, 0.0, thick])
+            ),
+            *self.parts.head.solids(self.mount),
+        )
+
+    def joints(self, rail_along_mm: float) -> tuple[Joint, ...]:
+        """Stub on rail, arm on stub, plate on arm, camera on head."""
+        stub, arm = self.members()
+        plate, head = self.placed()
+        bolts = {self.parts.screw: 2, self.parts.t_nut: 2}
+        two = {self.parts.corner.id: 2, self.parts.screw: 4, self.parts.t_nut: 4}
+        pitch = self.foot.pitch_deg
+        if pitch != 0.0:
+            bolts = {self.parts.pivot.id: 1, self.parts.screw: 4, self.parts.t_nut: 4}
+        on_rail = self.rig_from_rail[:3, 3]
+        across = self.mount.values()["across"]
+        middle = on_rail + self.rig_from_rail[:3, :3] @ np.array(
+            [across, self.parts.stub_y_mm(self.rail_size_mm[1]), 0.0]
+        )
+        along = float((middle - stub.axis_mm[0]) @ self.rig_from_rail[:3, 0])
+        name, seat = self.mount.name, self.mount.camera.pose.to_rig(
+            self.mount.camera.camera.body.mount_thread_camera_mm[None]
+        )[0]  # fmt: skip
+        return (
+            Joint(f"{name} a", self.rail, stub.id, on_rail, rail_along_mm, None, two),
+            Joint(f"{name} b", stub.id, arm.id, middle, along, None, two),
+            Joint(
+                f"{name} c", arm.id, plate.id, plate.rig_from_part[:3, 3],
+                arm.length_mm - self.parts.plate_mm[1] / 2.0, pitch or None, bolts,
+            ),
+            Joint(f"{name} d", head.id, name, seat, None, None, {}),
+        )  # fmt: skip
+
+    def touching(self) -> tuple[tuple[str, str], ...]:
+        """Pairs of owners that touch by intent."""
+        name, plate, head = self.mount.name, f"{self.mount.name} plate", head_id(self.mount.name)
+        return (
+            (self.rail, self.stub_id), (self.rail, self.arm_id), (self.stub_id, self.arm_id),
+            (self.arm_id, plate), (plate, head), (self.arm_id, head), (head, name), (plate, name),
+        )  # fmt: skip

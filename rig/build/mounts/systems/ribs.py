@@ -1,0 +1,142 @@
+"""The ribs of an arc: polygons of straight profile in upright planes about the subject."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from geometry.arrays import Floats
+from rig.catalogue.items import Profile
+from rig.build.mounts.kinematics import frame
+from rig.build.mounts.settings import (
+    Link,
+    Motion,
+    Setting,
+    shift,
+    turn,
+)
+from rig.build.mounts.solids import bar
+from rig.build.mounts.structure import (
+    Member,
+    Solid,
+)
+from rig.build.mounts.systems.outrigger import Z
+
+CORNER_MM = 20.0
+"""How far from a corner of the polygon stubs stay, for the joint."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rib:
+    """A polygon about ``centre_mm`` (3,), turned to ``turn_deg`` about the vertical.
+
+    Its ``count`` + 1 corners lie at ``radius_mm``, at even steps from elevation ``low_deg`` to
+    ``high_deg``.
+    """
+
+    id: str
+    profile: Profile
+    centre_mm: Floats
+    turn_deg: float
+    radius_mm: float
+    low_deg: float
+    high_deg: float
+    count: int
+    step_mm: float
+
+    @cached_property
+    def axes(self) -> Floats:
+        """Rotation (3, 3) of its plane: x across, y to the subject at elevation 0."""
+        return turn(Z, self.turn_deg)
+
+    def corner(self, index: int) -> Floats:
+        """A corner (3,), counted from the lower end."""
+        angle = np.radians(self.low_deg + (self.high_deg - self.low_deg) * index / self.count)
+        out = np.array([0.0, -np.cos(angle), np.sin(angle)])
+        return np.asarray(self.centre_mm + self.radius_mm * self.axes @ out)
+
+    @cached_property
+    def facets(self) -> tuple[Facet, ...]:
+        """All facets from the lower end upwards."""
+        return tuple(Facet(self, index) for index in range(self.count))
+
+    def nearest(self, point_mm: Floats) -> list[Facet]:
+        """Facets by how near they lie to the direction of a point."""
+        away = point_mm - self.centre_mm
+        return sorted(self.facets, key=lambda f: -float((f.middle_mm - self.centre_mm) @ away))
+
+
+@dataclass(frozen=True, eq=False)
+class Facet:
+    """One straight piece of a rib."""
+
+    rib: Rib
+    index: int
+
+    @property
+    def id(self) -> str:
+        """Id of the member."""
+        return f"{self.rib.id}.{self.index + 1}"
+
+    @property
+    def size_mm(self) -> tuple[float, float]:
+        """Width across and depth."""
+        return self.rib.profile.width_mm, self.rib.profile.height_mm
+
+    @cached_property
+    def ends_mm(self) -> tuple[Floats, Floats]:
+        """Lower and upper corner."""
+        return self.rib.corner(self.index), self.rib.corner(self.index + 1)
+
+    @property
+    def middle_mm(self) -> Floats:
+        """Half-way between the corners."""
+        return np.asarray((self.ends_mm[0] + self.ends_mm[1]) / 2.0)
+
+    @property
+    def length_mm(self) -> float:
+        """From corner to corner."""
+        return float(np.linalg.norm(self.ends_mm[1] - self.ends_mm[0]))
+
+    @property
+    def lean_deg(self) -> float:
+        """How far it leans from the vertical."""
+        return float(np.degrees(np.arccos(np.clip(self._start()[2, 2], -1.0, 1.0))))
+
+    def _start(self) -> Floats:
+        low, high = self.ends_mm
+        z, x = (high - low) / self.length_mm, self.rib.axes[:, 0]
+        return frame(low, x, np.cross(z, x), z)
+
+    def setting(self) -> Setting:
+        """Length of facet from its lower corner to the stub."""
+        return Setting(
+            "along", "mm", self.length_mm / 2.0, self.rib.step_mm, CORNER_MM,
+            self.length_mm - CORNER_MM,
+            f"the lower corner of {self.id} to the middle of the stub",
+        )  # fmt: skip
+
+    def links(self) -> tuple[Link, ...]:
+        """Along the facet to the middle of the stub."""
+        return (Link(self._start(), Motion.SLIDE, Z, "along"),)
+
+    def at(self, value: float) -> Floats:
+        """The stub's frame at a length along the facet."""
+        return np.asarray(self._start() @ shift(value * Z))
+
+    def frame_for(self, point_mm: Floats) -> Floats:
+        """The stub's frame abreast of a point."""
+        start = self._start()
+        return self.at(float(start[:3, 2] @ (point_mm - start[:3, 3])))
+
+    def member(self) -> Member:
+        """The piece of profile."""
+        axis, across = np.stack(self.ends_mm), self.rib.axes[:, 0]
+        return Member(self.id, self.rib.profile.id, "facet", axis, across, self.size_mm)
+
+    def solid(self) -> Solid:
+        """The room it takes."""
+        low, high = self.ends_mm
+        return bar(self.id, "member", low, high, self.rib.axes[:, 0], self.size_mm)

@@ -1,0 +1,281 @@
+"""The page of a mount plan: what it costs in accuracy, how it looks, what it is made of."""
+
+from __future__ import annotations
+
+import json
+from importlib.resources import files
+from string import Template
+from typing import Any
+
+from geometry.raycast import Occluder
+from rig.build.drawings.figures import (
+    POSE_COLUMNS,
+    mm,
+    pose_figures,
+    setting_text,
+)
+from rig.build.drawings.steps import plain_steps
+from rig.build.drawings.views import plan_solids
+from rig.design.figures import number
+from rig.build.mounts.plan import MountPlan
+from rig.build.mounts.settings import CameraMount
+from rig.build.parts.bill import Bill
+from rig.build.parts.cuts import Cut
+from common.page.html import (
+    element,
+    esc,
+    figure_text,
+    percent,
+    plot,
+    section,
+    table,
+)
+from rig.report.page import POLICY
+from rig.build.page.planview import plan_figure
+
+FIGURE = "plan-3d"
+CONTENTS = (
+    ("structure", "Structure"),
+    ("accuracy", "Accuracy"),
+    ("settings", "Settings"),
+    ("parts", "Parts"),
+    ("cuts", "Cut list"),
+    ("steps", "Steps"),
+)
+
+
+def render_plan_page(
+    plan: MountPlan, bill: Bill, cuts: tuple[Cut, ...], occluder: Occluder | None = None
+) -> str:
+    """The page as one HTML document that needs no network.
+
+    Names may hold anything: they are escaped. ``document.body.dataset`` gets ``view``, a JSON
+    summary of what is drawn, and ``ready`` once the figure stands.
+    """
+    # Imported here: plotly costs a second, and only a report needs it.
+    from plotly.offline import get_plotlyjs
+
+    solids = plan_solids(plan)
+    figure, ways = plan_figure(plan, solids, occluder)
+    figure.update_layout(template="none")
+    parts = {"figure": json.loads(figure.to_json()), "ways": ways}
+    view: dict[str, Any] = {
+        "cameras": len(plan.mounts),
+        "solids": len(solids),
+        "kinds": len(ways),
+        "parts": sum(line.quantity for line in bill.lines),
+        "sigma_median_mm": number(plan.price.built.sigma_median_mm),
+    }
+    return Template(_part("page.html")).substitute(
+        policy=POLICY,
+        title=esc(plan.name),
+        style=_part("style.css") + _part("plan.css"),
+        view=esc(json.dumps(view, allow_nan=False)),
+        header=_heading(plan),
+        main=_main(plan, bill, cuts),
+        footer="<p>Rig frame: millimetres, X to the subject's left, Y from the cameras towards "
+        "the subject, Z up. σ is one standard deviation.</p>",
+        plotly=get_plotlyjs(),
+        figures=_safe(json.dumps(parts, allow_nan=False)),
+        script=_part("plan.js"),
+    )
+
+
+def _part(name: str) -> str:
+    folder = files("rig.build.page" if name.startswith("plan.") else "rig.report")
+    return folder.joinpath(name).read_text(encoding="utf-8")
+
+
+def _safe(text: str) -> str:
+    """JSON that may stand inside a script element."""
+    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+
+
+def _heading(plan: MountPlan) -> str:
+    words = f"Mount plan ({plan.system}) for {len(plan.mounts)} cameras"
+    links = "".join(element("a", esc(name), href=f"#{key}") for key, name in CONTENTS)
+    return f"<h1>{esc(plan.name)}</h1><p>{esc(words)}</p><nav>{links}</nav>"
+
+
+def _main(plan: MountPlan, bill: Bill, cuts: tuple[Cut, ...]) -> str:
+    return "".join(
+        (
+            _verdict(plan),
+            _tiles(plan, bill),
+            _structure(),
+            _accuracy(plan),
+            _settings(plan),
+            _parts(bill),
+            _cuts(cuts),
+            _steps(plan),
+        )
+    )
+
+
+def _verdict(plan: MountPlan) -> str:
+    if plan.clashes:
+        word = f"{len(plan.clashes)} clashes: this plan cannot be built as it is."
+        first = plan.clashes[0]
+        more = f"The first: {first.one} and {first.other}. All are listed under Steps."
+    elif not plan.price.built.feasible:
+        word = "It can be built, but the rounded rig breaks limits of the design."
+        more = f"Broken: {', '.join(plan.price.built.broken)}."
+    else:
+        word = "It can be built: nothing collides and all limits of the design hold."
+        loss = percent(max(0.0, plan.price.sigma_loss))
+        more = f"Settings that exist cost {loss} of the median σ."
+    broken = bool(plan.clashes) or not plan.price.built.feasible
+    css = "verdict broken" if broken else "verdict"
+    return (
+        f'<div class="{css}"><p class="word">{esc(word)}</p><p class="more">{esc(more)}</p></div>'
+    )
+
+
+def _tile(name: str, figure: str, note: str) -> str:
+    return (
+        f'<div class="tile"><div class="name">{esc(name)}</div>'
+        f'<div class="figure">{figure}</div><div class="note">{esc(note)}</div></div>'
+    )
+
+
+def _tiles(plan: MountPlan, bill: Bill) -> str:
+    built, designed = plan.price.built, plan.price.designed
+    designed_words = f"{figure_text(designed.sigma_median_mm)} mm as designed"
+    cost = "–" if bill.cost is None else f"{bill.cost:.2f} <small>{esc(bill.currency)}</small>"
+    tiles = (
+        _tile(
+            "Median error σ", f"{figure_text(built.sigma_median_mm)} <small>mm</small>",
+            designed_words,
+        ),
+        _tile(
+            "Seen by two or more", percent(built.coverage_2_views),
+            f"{percent(designed.coverage_2_views)} as designed",
+        ),
+        _tile(
+            "Rigs within limits", percent(plan.yield_share),
+            f"of {plan.yield_trials} built half a step off at random",
+        ),
+        _tile(
+            "Mass", f"{bill.mass_g / 1000.0:.1f} <small>kg</small>",
+            f"without {len(bill.without_mass)} parts of unknown mass" if bill.without_mass else "",
+        ),
+        _tile(
+            "Cost", cost,
+            f"without {len(bill.without_price)} parts that have no price"
+            if bill.without_price else "",
+        ),
+    )  # fmt: skip
+    return f'<div class="tiles">{"".join(tiles)}</div>'
+
+
+def _structure() -> str:
+    words = (
+        "<b>Drag to turn, scroll to zoom.</b> Point at a part to read its name. Entries of the "
+        "legend switch kinds of parts on and off. The slider draws the rig apart."
+    )
+    slider = (
+        '<label class="apart">Draw apart <input type="range" id="apart" min="0" max="100" '
+        'value="0" step="1"></label>'
+    )
+    return section("structure", "Structure", words, slider, plot(FIGURE, "", "large"))
+
+
+def _accuracy(plan: MountPlan) -> str:
+    price = plan.price
+    stages = (("Designed", price.designed), ("Rounded", price.rounded), ("Built", price.built))
+    rows = [
+        (
+            name,
+            figure_text(f.sigma_median_mm),
+            figure_text(f.sigma_p95_mm),
+            percent(f.coverage_2_views),
+            percent(f.coverage_3_views),
+            "all hold" if f.feasible else esc(", ".join(f.broken) or "broken"),
+        )
+        for name, f in stages
+    ]
+    head = ("", "σ median mm", "σ 95 % mm", "Two views", "Three views", "Limits")
+    words = (
+        "The design; its settings rounded one by one to what can be set; and what is built: "
+        "rounded with the other settings optimised again after each."
+    )
+    return section("accuracy", "What rounding costs", words, table(head, rows))
+
+
+def _settings(plan: MountPlan) -> str:
+    words = (
+        "What is set on each camera. In brackets how far one setting may be off, alone, before a "
+        "limit breaks. The setting sheets say where each is measured from."
+    )
+    found = {(t.camera, t.setting): t for t in plan.tolerances}
+
+    def cell(mount: CameraMount, k: int) -> str:
+        if k >= len(mount.settings):
+            return ""
+        s = mount.settings[k]
+        unit = "°" if s.unit == "deg" else " mm"
+        tolerance = found.get((mount.name, s.name))
+        slack = ""
+        if tolerance is not None:
+            near = min(abs(tolerance.plus), abs(tolerance.minus))
+            slack = f" <small>({figure_text(near, 2)})</small>"
+        return f"{esc(s.name)} <b>{esc(setting_text(s))}</b>{unit}{slack}"
+
+    most = max((len(m.settings) for m in plan.mounts), default=0)
+    rows = [(esc(m.name), *(cell(m, k) for k in range(most))) for m in plan.mounts]
+    poses = [tuple(map(esc, pose_figures(m.camera, plan.datum_rig_mm))) for m in plan.mounts]
+    return section(
+        "settings",
+        "Settings",
+        words,
+        table(("Camera", *[""] * most), rows),
+        "<h3>Poses, optical centre from the datum</h3>",
+        table(tuple(map(esc, POSE_COLUMNS)), poses),
+    )
+
+
+def _parts(bill: Bill) -> str:
+    rows = [
+        (
+            esc(line.name),
+            esc(line.part),
+            str(line.quantity),
+            "" if line.length_mm is None else mm(line.length_mm),
+            "–" if line.mass_g is None else f"{line.mass_g:.0f}",
+            "–" if line.cost is None else f"{line.cost:.2f}",
+            esc(line.note),
+        )
+        for line in bill.lines
+    ]
+    cost = "–" if bill.cost is None else f"{bill.cost:.2f}"
+    rows.append(("<b>Sum of what is known</b>", "", "", "", f"{bill.mass_g:.0f}", cost, ""))
+    currency = f" {esc(bill.currency)}" if bill.currency and bill.cost is not None else ""
+    head = ("Part", "Id", "Count", "Length mm", "Mass g", f"Cost{currency}", "")
+    words = "What to buy and to make. Figures that nobody published are left out of the sums."
+    return section("parts", "Parts", words, table(head, rows))
+
+
+def _cuts(cuts: tuple[Cut, ...]) -> str:
+    if not cuts:
+        return section("cuts", "Cut list", "Nothing has to be cut.")
+    rows = [
+        (esc(c.name), esc(c.role), mm(c.length_mm), str(c.quantity), esc(", ".join(c.members)))
+        for c in cuts
+    ]
+    return section(
+        "cuts", "Cut list", "", table(("Profile", "For", "Length mm", "Count", "Members"), rows)
+    )
+
+
+def _steps(plan: MountPlan) -> str:
+    steps = "".join(element("li", esc(step)) for step in plain_steps(plan))
+    notes = "".join(element("li", esc(note)) for note in plan.notes)
+    clashes = "".join(
+        f"<li>{esc(c.one)} and {esc(c.other)} ({esc(c.kind)}): {figure_text(c.clearance_mm)} mm, "
+        f"asked for {figure_text(c.required_mm)} mm</li>"
+        for c in plan.clashes
+    )
+    content = f'<ol class="steps">{steps}</ol>'
+    content += f"<h3>Notes</h3><ul class='notes'>{notes}</ul>" if notes else ""
+    content += f'<h3>Clashes</h3><ul class="notes warning">{clashes}</ul>' if clashes else ""
+    return section("steps", "Assembly steps", "", content)

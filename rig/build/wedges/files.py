@@ -1,0 +1,56 @@
+"""Files for a printer: STL and 3MF, the part lying as it is printed."""
+
+from __future__ import annotations
+
+import io
+import itertools
+import re
+import uuid
+import zipfile
+from typing import TYPE_CHECKING
+
+from rig.build.wedges.recipe import PrintPart
+from rig.build.wedges.solid import bracket_mesh
+
+if TYPE_CHECKING:
+    import trimesh
+
+ZIP_TIME = (1980, 1, 1, 0, 0, 0)
+UUID = re.compile(rb'UUID="[0-9a-f-]{36}"')
+
+
+def bracket_stl(part: PrintPart, mesh: trimesh.Trimesh | None = None) -> bytes:
+    """The wedge as binary STL. STL names no unit; the numbers are millimetres."""
+    from trimesh.exchange.stl import export_stl
+
+    solid = bracket_mesh(part) if mesh is None else mesh
+    return bytes(export_stl(solid))
+
+
+def bracket_3mf(part: PrintPart, mesh: trimesh.Trimesh | None = None) -> bytes:
+    """The wedge as 3MF, unit millimetre, the object named after the wedge."""
+    import trimesh
+
+    solid = bracket_mesh(part) if mesh is None else mesh
+    solid.units = "mm"
+    scene = trimesh.Scene()
+    scene.add_geometry(solid, node_name=part.name, geom_name=part.name)
+    scene.units = "mm"
+    return _same_each_time(bytes(scene.export(file_type="3mf")))  # type: ignore[no-untyped-call]
+
+
+def _same_each_time(package: bytes) -> bytes:
+    """The package with identifiers that follow from its content instead of from chance."""
+    stream = io.BytesIO()
+    with (
+        zipfile.ZipFile(io.BytesIO(package)) as given,
+        zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive,
+    ):
+        for entry in given.infolist():
+            counted = itertools.count()
+            content = UUID.sub(
+                lambda _: b'UUID="%s"' % str(uuid.UUID(int=next(counted) + 1)).encode(),  # noqa: B023
+                given.read(entry),
+            )
+            archive.writestr(zipfile.ZipInfo(entry.filename, ZIP_TIME), content)
+    return stream.getvalue()

@@ -1,0 +1,1 @@
+"""A design and its layout as files."""

@@ -1,0 +1,1 @@
+"""Camera bodies and views as solids in space."""

@@ -1,0 +1,1 @@
+"""What a lab asks for: the rig file, read and checked."""

@@ -1,0 +1,108 @@
+"""The rig file: what a rig is made of and what it must respect, as a person writes it.
+
+TOML in files, the same structure as JSON over HTTP. ``docs/rig-file.md`` lists the keys.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Literal, Self
+
+from pydantic import Field
+
+from common.files.strict import StrictModel, validated
+from common.files.toml import parsed, read_text
+from rig.catalogue import Catalogue
+from rig.specification.sections.camera import CameraSection
+from rig.specification.sections.limits import LimitsSection
+from rig.specification.sections.parts import CATALOGUE
+from rig.specification.sections.poses import FixedSection, StartSection
+from rig.specification.sections.subject import ScanSection, SubjectSection
+from rig.specification.spec import RigSpec
+
+SCHEMA: Literal["rigwright.rig/1"] = "rigwright.rig/1"
+"""A rig file is a page or two; a larger one is another file given by mistake."""
+
+
+class RigFile(StrictModel):
+    """The root of a rig file."""
+
+    schema_: Literal["rigwright.rig/1"] = Field(
+        alias="schema", description='Version of the format: `"rigwright.rig/1"`.'
+    )
+    name: str = Field(
+        default="rig", min_length=1, max_length=200, description="What to call the rig."
+    )
+    cameras: int | None = Field(
+        default=None,
+        ge=1,
+        le=500,
+        description="How many cameras to place, fixed ones not counted. Without it: as many as "
+        "there are `[[start]]` poses, or 7.",
+    )
+    seed: int = Field(default=0, ge=0, le=2**53 - 1, description="Seed of everything random.")
+    starts: int = Field(default=8, ge=1, le=1000, description="How many starts to try.")
+    camera: CameraSection = Field(description="The kind of camera.")
+    limits: LimitsSection = Field(
+        default_factory=LimitsSection, description="What the rig must respect."
+    )
+    fixed: list[FixedSection] = Field(default_factory=list, description="Cameras that stay.")
+    start: list[StartSection] = Field(default_factory=list, description="Poses to start from.")
+    scan: ScanSection = Field(default_factory=ScanSection, description="How to read the scan.")
+    subject: SubjectSection = Field(
+        default_factory=SubjectSection, description="Which part of it to design for."
+    )
+
+    def to_spec(self) -> RigSpec:
+        """The rig as the rest of the program sees it; checks what only shows in the whole."""
+        camera = self.camera.to_camera()
+        return RigSpec(
+            name=self.name,
+            camera=camera,
+            count=self.cameras or len(self.start) or 7,
+            seed=self.seed,
+            starts=self.starts,
+            limits=self.limits.to_limits(),
+            fixed=tuple(section.to_rig_camera(camera) for section in self.fixed),
+            start=tuple(section.to_pose() for section in self.start),
+            scan_options=self.scan.to_options(),
+            subject_options=self.subject.to_options(self.seed),
+        )
+
+    @classmethod
+    def from_spec(cls, spec: RigSpec) -> Self:
+        """The file that describes ``spec``: what a design is filed with."""
+        return cls(
+            schema=SCHEMA,
+            name=spec.name,
+            cameras=spec.count,
+            seed=spec.seed,
+            starts=spec.starts,
+            camera=CameraSection.from_camera(spec.camera),
+            limits=LimitsSection.from_limits(spec.limits),
+            fixed=[FixedSection.from_rig_camera(camera) for camera in spec.fixed],
+            start=[StartSection.from_pose(pose) for pose in spec.start],
+            scan=ScanSection.from_options(spec.scan_options),
+            subject=SubjectSection.from_options(spec.subject_options),
+        )
+
+
+def rig_from_mapping(
+    data: Mapping[str, object], name: str = "rig", catalogue: Catalogue | None = None
+) -> RigSpec:
+    """A rig from parsed TOML or JSON; ``name`` stands in front of every error.
+
+    ``catalogue`` supplies the parts it names; without it, the one that comes with the program.
+    """
+    return validated(RigFile, data, name, {CATALOGUE: catalogue}).to_spec()
+
+
+def parse_rig(text: str, name: str = "rig", catalogue: Catalogue | None = None) -> RigSpec:
+    """A rig from the text of a rig file; raises a one-line :class:`InputError`."""
+    return rig_from_mapping(parsed(text, name, "rig", "rig file"), name, catalogue)
+
+
+def read_rig(path: Path, catalogue: Catalogue | None = None) -> RigSpec:
+    """A rig from a file; raises a one-line :class:`InputError`."""
+    return parse_rig(read_text(path, "rig", "rig file"), path.name, catalogue)

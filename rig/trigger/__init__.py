@@ -1,4 +1,0 @@
-"""The trigger box: protocol, drivers, clock model, fake device, fault proxy.
-
-:mod:`rig.trigger.box` is the interface; everything above knows nothing else of a box.
-"""

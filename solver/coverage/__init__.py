@@ -1,0 +1,1 @@
+"""Who sees what: visibility, required views, visibility cuts."""

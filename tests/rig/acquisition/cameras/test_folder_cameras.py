@@ -1,0 +1,160 @@
+from __future__ import annotations
+
+import threading
+import time
+from pathlib import Path
+
+import pytest
+from camera_rigs import jpeg
+
+from common.errors import DeviceError, InputError, NotFoundError
+from rig.acquisition.cameras.base import ArmSpec, CameraSettings, TriggerKind
+from rig.acquisition.cameras.folder import FolderBackend
+
+SHOT = ArmSpec("a", 1, 5.0)
+SETTLE_S = 0.1
+
+
+def folder(root: Path, **options: object) -> FolderBackend:
+    return FolderBackend(root=str(root), settle_s=SETTLE_S, **options)
+
+
+def test_a_file_still_being_written_is_waited_for(tmp_path: Path) -> None:
+    (tmp_path / "left").mkdir()
+    camera = folder(tmp_path).open("left")
+    camera.arm(SHOT)
+    data, path = jpeg("1"), tmp_path / "left" / "a.jpg"
+    path.write_bytes(data[:-40])
+    # Its size does not change for long, as with a slow cable; yet it is not all there.
+    assert camera.wait_frames(1, 4 * SETTLE_S) == ()
+    assert camera.health().counters["unfinished_files"] == 1
+    with path.open("ab") as file:
+        file.write(data[-40:])
+    (frame,) = camera.wait_frames(1, 2.0)
+    assert frame.encoded == data
+    assert camera.health().counters["unfinished_files"] == 0
+
+
+def test_a_file_written_drop_by_drop_comes_whole(tmp_path: Path) -> None:
+    (tmp_path / "left").mkdir()
+    camera = folder(tmp_path).open("left")
+    camera.arm(SHOT)
+    data = jpeg("1")
+
+    def write() -> None:
+        with (tmp_path / "left" / "a.jpg").open("wb", buffering=0) as file:
+            for start in range(0, len(data), 100):
+                file.write(data[start : start + 100])
+                time.sleep(0.02)
+
+    writer = threading.Thread(target=write)
+    writer.start()
+    (frame,) = camera.wait_frames(1, 5.0)
+    writer.join()
+    assert frame.encoded == data
+
+
+def test_a_file_half_there_when_armed_is_of_before(tmp_path: Path) -> None:
+    (tmp_path / "left").mkdir()
+    camera = folder(tmp_path).open("left")
+    data, path = jpeg("1"), tmp_path / "left" / "late.jpg"
+    path.write_bytes(data[:100])
+    camera.arm(SHOT)
+    path.write_bytes(data)
+    assert camera.wait_frames(1, 3 * SETTLE_S) == ()
+
+
+def test_a_file_written_anew_under_its_name_counts(tmp_path: Path) -> None:
+    (tmp_path / "left").mkdir()
+    path = tmp_path / "left" / "latest.jpg"
+    path.write_bytes(jpeg("1"))
+    camera = folder(tmp_path).open("left")
+    camera.arm(SHOT)
+    path.write_bytes(jpeg("22"))
+    (frame,) = camera.wait_frames(1, 2.0)
+    assert frame.metadata["BodySerialNumber"] == "22"
+
+
+def test_what_the_file_says_of_itself_comes_along(tmp_path: Path) -> None:
+    (tmp_path / "left").mkdir()
+    camera = folder(tmp_path).open("left")
+    camera.arm(SHOT)
+    (tmp_path / "left" / "a.jpg").write_bytes(jpeg("0012345", exposure=(1, 125)))
+    (frame,) = camera.wait_frames(1, 2.0)
+    assert frame.metadata["BodySerialNumber"] == "0012345"
+    assert frame.metadata["file"] == "a.jpg"
+    assert frame.exposure_us == 8000.0
+
+
+def test_files_go_to_the_camera_whose_number_they_carry(tmp_path: Path) -> None:
+    backend = folder(tmp_path, by="serial", cameras={"left": "111", "right": "222"})
+    assert [info.id for info in backend.discover()] == ["left", "right"]
+    left, right = backend.open("left"), backend.open("right")
+    left.arm(SHOT)
+    right.arm(SHOT)
+    (tmp_path / "day" / "card").mkdir(parents=True)
+    for name, serial in (("a", "222"), ("b", "111"), ("c", ""), ("d", "333")):
+        (tmp_path / "day" / "card" / f"{name}.jpg").write_bytes(jpeg(serial))
+    assert [f.metadata["file"] for f in left.wait_frames(1, 2.0)] == ["b.jpg"]
+    assert [f.metadata["file"] for f in right.wait_frames(1, 2.0)] == ["a.jpg"]
+    assert left.health().counters["frames"] == 1
+
+
+def test_numbers_seen_so_far_are_cameras(tmp_path: Path) -> None:
+    (tmp_path / "a.jpg").write_bytes(jpeg("111"))
+    (tmp_path / "b.jpg").write_bytes(jpeg("222"))
+    (tmp_path / "c.jpg").write_bytes(jpeg("111"))
+    assert [i.id for i in folder(tmp_path, by="serial").discover()] == ["111", "222"]
+
+
+def test_only_wanted_kinds_of_files_count(tmp_path: Path) -> None:
+    (tmp_path / "left").mkdir()
+    camera = folder(tmp_path, suffixes=[".PNG"]).open("left")
+    camera.arm(SHOT)
+    (tmp_path / "left" / "a.jpg").write_bytes(jpeg("1"))
+    (tmp_path / "left" / ".hidden.png").write_bytes(jpeg("1"))
+    (tmp_path / "left" / "notes.txt").write_text("no picture")
+    assert camera.wait_frames(1, 3 * SETTLE_S) == ()
+
+
+def test_frames_of_before_are_counted_once(tmp_path: Path) -> None:
+    (tmp_path / "left").mkdir()
+    camera = folder(tmp_path).open("left")
+    for k in range(3):
+        (tmp_path / "left" / f"{k}.jpg").write_bytes(jpeg("1"))
+    camera.arm(SHOT)
+    camera.arm(SHOT)
+    assert camera.health().counters["stale_frames"] == 3
+
+
+def test_a_folder_that_goes_away_is_a_camera_that_is_gone(tmp_path: Path) -> None:
+    (tmp_path / "left").mkdir()
+    camera = folder(tmp_path).open("left")
+    (tmp_path / "left").rmdir()
+    with pytest.raises(DeviceError, match=r"camera left .*its folder") as caught:
+        camera.arm(SHOT)
+    assert caught.value.code == "device/camera-gone"
+    assert camera.health().problem == "its folder is not there"
+
+
+def test_the_box_may_fire_these_cameras(tmp_path: Path) -> None:
+    (tmp_path / "left").mkdir()
+    camera = folder(tmp_path, trigger="edge").open("left")
+    assert camera.capabilities.trigger is TriggerKind.EDGE
+    assert camera.capabilities.settable == frozenset()
+    with pytest.raises(InputError, match=r"only seen through its files"):
+        camera.configure(CameraSettings(exposure_us=1.0))
+
+
+def test_wrong_options_are_named(tmp_path: Path) -> None:
+    for options, word in (
+        ({"root": str(tmp_path / "no")}, "no folder"),
+        ({"root": str(tmp_path), "by": "colour"}, "'by'"),
+        ({"root": str(tmp_path), "settel_s": 1}, "'settel_s'"),
+        ({}, "'root'"),
+    ):
+        with pytest.raises(InputError, match=word) as caught:
+            FolderBackend(**options)
+        assert caught.value.code == "input/camera-option"
+    with pytest.raises(NotFoundError, match=r"known: none"):
+        folder(tmp_path).open("left")
