@@ -22,7 +22,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from common.errors import RigwrightError
-from rig.acquisition.trigger.box import ArmRequest, FireReport, Outcome, Pulse
+from rig.acquisition.trigger.box import ArmRequest, FireOutcome, FireReport, Pulse
 from rig.acquisition.trigger.driver import BoxAddress, SerialTriggerBox
 from rig.acquisition.trigger.endpoint import PtyEndpoint
 from rig.acquisition.trigger.fake.device import FakeSettings
@@ -145,15 +145,15 @@ def judge(shooter: Shooter, made: Callable[[str], Rises]) -> None:
             lacking += max(request.shots - rises.get(output, 0), 0)
         tally.extra_pulses += extra
         report = shooter.reports.get(capture)
-        said = report.outcome if report is not None else Outcome.NOT_FIRED
+        said = report.outcome if report is not None else FireOutcome.NOT_FIRED
         none_made = not any(rises.values())
         wrong = {
-            Outcome.FIRED: lacking > 0,
-            Outcome.NOT_FIRED: not none_made,
-            Outcome.PARTIAL: False,
-            Outcome.UNKNOWN: False,
+            FireOutcome.FIRED: lacking > 0,
+            FireOutcome.NOT_FIRED: not none_made,
+            FireOutcome.PARTIAL: False,
+            FireOutcome.UNKNOWN: False,
         }[said]
-        if said is Outcome.FIRED:
+        if said is FireOutcome.FIRED:
             tally.missing_pulses += lacking
         if wrong:
             tally.wrong.append(f"{capture}: {said.value}, but {dict(rises)} of {request.shots}")

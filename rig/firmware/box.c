@@ -239,12 +239,22 @@ static void show(void)
     }
 }
 
+static void watch_interlock(void)
+{
+    bool was_closed = interlock_closed();
+    bool opened = interlock_poll();
+    if (interlock_closed() != was_closed) {
+        events_add(EVENT_INTERLOCK, NULL, interlock_closed());
+    }
+    if (opened && (state == STATE_ARMED || state == STATE_FIRING)) {
+        fault(WHY_INTERLOCK);
+    }
+}
+
 void box_poll(void)
 {
     finish();
-    if (interlock_poll() && (state == STATE_ARMED || state == STATE_FIRING)) {
-        fault(WHY_INTERLOCK);
-    }
+    watch_interlock();
     if (supervisor_overtime(current ? current->shots : 0)) {
         fault(WHY_OVERTIME);
     }

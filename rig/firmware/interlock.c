@@ -7,7 +7,6 @@
 #include "board.h"
 #include "burst.h"
 #include "clock.h"
-#include "events.h"
 
 #define SETTLE_TICKS (10 * TICKS_PER_MS)
 
@@ -64,13 +63,9 @@ bool interlock_poll(void)
     }
     if (opened) {
         open_seen = clock_ticks();
-        if (closed) {
-            closed = false;
-            events_add(EVENT_INTERLOCK, 0, closed);
-        }
+        closed = false;
     } else if (!closed && clock_ticks() - open_seen >= SETTLE_TICKS) {
         closed = true;
-        events_add(EVENT_INTERLOCK, 0, closed);
     }
     return opened;
 }

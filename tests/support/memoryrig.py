@@ -31,8 +31,8 @@ from rig.acquisition.station.spec import CameraPlan, CapturePolicy, Station, Tri
 from rig.acquisition.trigger.box import (
     ArmRequest,
     Edge,
+    FireOutcome,
     FireReport,
-    Outcome,
     TriggerCapabilities,
     TriggerHealth,
     TriggerState,
@@ -115,10 +115,17 @@ class MemoryBox:
             self.fired.append(capture_id)
             self._reports[capture_id] = self._make_edges(request)
         else:
-            self._reports[capture_id] = FireReport(capture_id, Outcome.NOT_FIRED, 0, request.shots)
+            self._reports[capture_id] = FireReport(
+                capture_id, FireOutcome.NOT_FIRED, 0, request.shots
+            )
         if self.script.lost_while_firing:
             self._reports[capture_id] = FireReport(
-                capture_id, Outcome.UNKNOWN, 0, request.shots, acknowledged=False, why="unplugged"
+                capture_id,
+                FireOutcome.UNKNOWN,
+                0,
+                request.shots,
+                acknowledged=False,
+                why="unplugged",
             )
             raise DeviceError("trigger-gone", "the box does not answer", "plug it in")
 
@@ -142,7 +149,7 @@ class MemoryBox:
                     listener(request.capture_id, edge.shot, edge.at_host_ns)
         return FireReport(
             request.capture_id,
-            Outcome.FIRED if shots == request.shots else Outcome.PARTIAL,
+            FireOutcome.FIRED if shots == request.shots else FireOutcome.PARTIAL,
             shots,
             request.shots,
             tuple(edges) if self.script.log else (),

@@ -6,7 +6,7 @@ import numpy as np
 
 from geometry.camera import Body, Camera, RigCamera
 from geometry.frames import Pose
-from rig.acquisition.trigger.box import Edge, FireReport, Outcome
+from rig.acquisition.trigger.box import Edge, FireOutcome, FireReport
 
 NONE = (0.0, 0.0, 0.0, 0.0, 0.0)
 STRONG = (-0.28, 0.11, 0.002, -0.003, -0.02)
@@ -75,4 +75,4 @@ def report(
         for rising, at_us in ((True, delay_us), (False, delay_us + width_us))
     ]
     edges.sort(key=lambda edge: edge.at_host_ns)
-    return FireReport(capture_id, Outcome.FIRED, shots, shots, tuple(edges), 20.0)
+    return FireReport(capture_id, FireOutcome.FIRED, shots, shots, tuple(edges), 20.0)

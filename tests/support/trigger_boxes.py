@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from common.errors import RigwrightError
-from rig.acquisition.trigger.box import ArmRequest, Outcome, Pulse, TriggerState
+from rig.acquisition.trigger.box import ArmRequest, FireOutcome, Pulse, TriggerState
 from rig.acquisition.trigger.driver import BoxAddress, SerialTriggerBox
 from rig.acquisition.trigger.fake.device import FakeSettings
 from rig.acquisition.trigger.fake.program import FakeTrigger, start_fake
@@ -141,4 +141,4 @@ def named_in_time(kind: type[RigwrightError], code: str) -> Iterator[None]:
 def fire_whole(driver: SerialTriggerBox, capture: str) -> None:
     driver.arm(request_for(capture))
     driver.fire(capture)
-    assert driver.wait_done(capture, 2.0).outcome is Outcome.FIRED
+    assert driver.wait_done(capture, 2.0).outcome is FireOutcome.FIRED

@@ -19,7 +19,7 @@ from rig.acquisition.synchrony.pairing import pair
 from rig.acquisition.synchrony.shooting import CameraPart, Shooting
 from rig.acquisition.synchrony.swaps import swapped
 from rig.acquisition.synchrony.take import Pairing, Take
-from rig.acquisition.trigger.box import Outcome
+from rig.acquisition.trigger.box import FireOutcome
 
 Sizes = Mapping[str, tuple[int, int]]
 
@@ -52,13 +52,13 @@ def develop(station: Station, firing: Firing, fit: ClockFitter, sizes: Sizes) ->
 def _shots_done(firing: Firing) -> int:
     """How many shots there were; a lost box is taken to have made them all until shown wrong."""
     report = firing.report
-    if report is None or report.outcome is Outcome.UNKNOWN:
+    if report is None or report.outcome is FireOutcome.UNKNOWN:
         return firing.order.shots
     return report.shots_done
 
 
 def _require_fired(firing: Firing, parts: tuple[CameraPart, ...]) -> None:
-    if firing.report is None or firing.report.outcome is not Outcome.UNKNOWN:
+    if firing.report is None or firing.report.outcome is not FireOutcome.UNKNOWN:
         return
     if not any(part.pairing.pairs for part in parts):
         raise DeviceError(

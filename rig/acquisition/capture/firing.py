@@ -12,7 +12,7 @@ from rig.acquisition.capture.collect import Collected
 from rig.acquisition.capture.hands import CameraHand
 from rig.acquisition.synchrony.faults import Fault
 from rig.acquisition.synchrony.instants import Bracket
-from rig.acquisition.trigger.box import ArmRequest, FireReport, Outcome
+from rig.acquisition.trigger.box import ArmRequest, FireOutcome, FireReport
 
 
 class Fate(StrEnum):
@@ -24,10 +24,10 @@ class Fate(StrEnum):
 
 
 FATES = {
-    Outcome.FIRED: Fate.FIRED,
-    Outcome.PARTIAL: Fate.FIRED,
-    Outcome.NOT_FIRED: Fate.NOT_FIRED,
-    Outcome.UNKNOWN: Fate.UNKNOWN,
+    FireOutcome.FIRED: Fate.FIRED,
+    FireOutcome.PARTIAL: Fate.FIRED,
+    FireOutcome.NOT_FIRED: Fate.NOT_FIRED,
+    FireOutcome.UNKNOWN: Fate.UNKNOWN,
 }
 
 

@@ -20,7 +20,7 @@ from rig.acquisition.station.pulses import arm_request
 from rig.acquisition.station.spec import Interlock, Station
 from rig.acquisition.synchrony.faults import Fault, FaultKind
 from rig.acquisition.synchrony.instants import Bracket
-from rig.acquisition.trigger.box import ArmRequest, FireReport, Outcome, TriggerBox
+from rig.acquisition.trigger.box import ArmRequest, FireOutcome, FireReport, TriggerBox
 
 WATCH_S = 0.05
 BOX_MARGIN_S = 2.0
@@ -205,10 +205,10 @@ class CaptureRun:
             return None
         report = self.box.wait_done(request.capture_id, self._pulses_s(request) + BOX_MARGIN_S)
         self.fate = FATES[report.outcome]
-        if report.outcome is Outcome.PARTIAL:
+        if report.outcome is FireOutcome.PARTIAL:
             # Nobody needs to wait for pictures of shots that were not made.
             self._pictures = report.shots_done
-        if report.outcome is Outcome.NOT_FIRED:
+        if report.outcome is FireOutcome.NOT_FIRED:
             self._stop_if_cancelled()
             raise problem or DeviceError(
                 "trigger-not-fired",

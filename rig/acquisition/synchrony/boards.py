@@ -6,7 +6,7 @@ from dataclasses import asdict
 
 from rig.acquisition.cameras.base import Image
 from rig.acquisition.station.spec import Station
-from rig.acquisition.synchrony.optical import BoardReading
+from rig.acquisition.synchrony.optical import ExposureReading
 from rig.acquisition.synchrony.verdict import Board
 
 
@@ -18,7 +18,7 @@ def station_board(station: Station) -> Board | None:
 
     board = TimingBoard(**asdict(station.board))
 
-    def read(picture: Image, exposure_us: float | None) -> BoardReading:
+    def read(picture: Image, exposure_us: float | None) -> ExposureReading:
         return read_board(picture, board, exposure_us=exposure_us)
 
     return Board(read, board.range_us)

@@ -20,7 +20,7 @@ SURE = 3.0
 """Standard deviations that count as the half width of a reading."""
 
 
-class BoardReading(Protocol):
+class ExposureReading(Protocol):
     """What reading a picture of the board gives: microseconds of the board's counter."""
 
     @property
@@ -44,7 +44,7 @@ class BoardReading(Protocol):
         ...
 
 
-BoardReader = Callable[[Image, float | None], BoardReading]
+BoardReader = Callable[[Image, float | None], ExposureReading]
 """Reads a picture, given the exposure time in microseconds where it is known.
 
 Raises :class:`InputError` where the board is not seen or not readable.
@@ -95,7 +95,7 @@ def optical_evidence(
     return OpticalEvidence(tuple(readings), unread, spread, uncertainty)
 
 
-def _read(frame: Frame, part: CameraPart, read: BoardReader) -> BoardReading:
+def _read(frame: Frame, part: CameraPart, read: BoardReader) -> ExposureReading:
     exposure = frame.exposure_us or part.settings.exposure_us
     if frame.pixels is not None:
         return read(frame.pixels, exposure)
@@ -112,7 +112,7 @@ def _read(frame: Frame, part: CameraPart, read: BoardReader) -> BoardReading:
 
 
 def _reading(
-    station: Station, part: CameraPart, shot: int, found: BoardReading, range_us: float
+    station: Station, part: CameraPart, shot: int, found: ExposureReading, range_us: float
 ) -> FrameReading:
     start = found.mid_us - found.exposure_us / 2.0
     edge = station.shutter_delay_us(part.plan) - _board_zero_us(station)

@@ -28,7 +28,7 @@ class TriggerState(StrEnum):
     """The box has stopped for safety and wants a reset."""
 
 
-class Outcome(StrEnum):
+class FireOutcome(StrEnum):
     """What became of a capture at the box."""
 
     FIRED = "fired"
@@ -108,7 +108,7 @@ class FireReport:
     """
 
     capture_id: str
-    outcome: Outcome
+    outcome: FireOutcome
     shots_done: int
     shots_wanted: int
     edges: tuple[Edge, ...] = ()

@@ -12,12 +12,18 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from common.errors import DeviceError
+from rig.acquisition.trigger.armed import (
+    known_report,
+    stranger_report,
+)
 from rig.acquisition.trigger.box import ArmRequest, FireReport, TriggerCapabilities, TriggerHealth
 from rig.acquisition.trigger.captures import Captures
 from rig.acquisition.trigger.clock import ClockModel
-from rig.acquisition.trigger.flight import known_report, stranger_report
+from rig.acquisition.trigger.connection import (
+    BoxView,
+    Connection,
+)
 from rig.acquisition.trigger.jobs import PATIENCE_S, JobQueue
-from rig.acquisition.trigger.keeper import BoxView, Keeper
 from rig.acquisition.trigger.metrics import Metrics, WireLog, WireTape
 from rig.acquisition.trigger.owner import PROBE_S, PortOwner
 from rig.acquisition.trigger.program import compile_program
@@ -63,10 +69,10 @@ class SerialTriggerBox:
         self.address = address
         self._metrics = Metrics()
         self._tape = WireTape(wire_log)
-        self._keeper = Keeper(address.serial_number, self._metrics, self._tape)
-        self._keeper.clock = ClockModel(address.wire_ns())
+        self._connection = Connection(address.serial_number, self._metrics, self._tape)
+        self._connection.clock = ClockModel(address.wire_ns())
         self._queue: JobQueue | None = None
-        self._captures = Captures(self._keeper, self._aborting)
+        self._captures = Captures(self._connection, self._aborting)
         self._owner: PortOwner | None = None
         self._listeners: list[Callable[[FireReport], None]] = []
         self._lock = threading.Lock()
@@ -75,7 +81,7 @@ class SerialTriggerBox:
     @property
     def capabilities(self) -> TriggerCapabilities:
         """What this box can do; :class:`DeviceError` before it has been opened."""
-        limits = self._keeper.view.limits
+        limits = self._connection.view.limits
         if limits is None:
             raise _closed()
         return limits.capabilities()
@@ -91,14 +97,16 @@ class SerialTriggerBox:
             if self._owner is not None:
                 return
             self._queue = queue = JobQueue()
-            owner = PortOwner(self._keeper, self._captures, queue, lambda: self._open_line(queue))
+            owner = PortOwner(
+                self._connection, self._captures, queue, lambda: self._open_line(queue)
+            )
             self._owner = owner
         owner.start()
         try:
             owner.opened.result(PROBE_S + 4.0)
         except TimeoutError:
             self.close()
-            raise _late(self._keeper.view) from None
+            raise _late(self._connection.view) from None
         except BaseException:
             self.close()
             raise
@@ -112,11 +120,11 @@ class SerialTriggerBox:
 
     def close(self) -> None:
         """Disarm if armed, and let go of the port. Closing twice changes nothing."""
-        flight = self._captures.current
-        if flight is not None and not flight.fire_sent:
+        capture = self._captures.current
+        if capture is not None and not capture.fire_sent:
             # A box that is gone disarms itself after 3 s without us.
             with suppress(DeviceError):
-                self.disarm(flight.id)
+                self.disarm(capture.id)
         with self._lock:
             owner, self._owner = self._owner, None
         if owner is None:
@@ -125,7 +133,7 @@ class SerialTriggerBox:
 
     def health(self) -> TriggerHealth:
         """The present state; asks nothing of the box and never raises."""
-        view = self._keeper.view
+        view = self._connection.view
         identity = view.identity
         median, p99 = self._metrics.percentiles_ms()
         return TriggerHealth(
@@ -145,7 +153,7 @@ class SerialTriggerBox:
 
     def arm(self, request: ArmRequest) -> None:
         """Load the pulses and arm. The box is ARMED when this returns."""
-        limits = self._keeper.view.limits
+        limits = self._connection.view.limits
         if limits is None:
             raise _closed()
         program = compile_program(request, limits)
@@ -154,7 +162,7 @@ class SerialTriggerBox:
         try:
             self._order(lambda: self._captures.arm(program, abandoned.is_set))
         except DeviceError:
-            # In this order: the flight that is not there yet will see the event.
+            # In this order: the capture that is not there yet will see the event.
             abandoned.set()
             self._captures.give_up(request.capture_id)
             if self._queue is not None:
@@ -169,9 +177,9 @@ class SerialTriggerBox:
         try:
             self._order(lambda: self._captures.fire(capture_id))
         except DeviceError:
-            flight = self._captures.find(capture_id)
-            if flight is not None and not flight.fire_sent:
-                flight.wanted = False
+            capture = self._captures.find(capture_id)
+            if capture is not None and not capture.fire_sent:
+                capture.wanted = False
             raise
 
     def wait_done(self, capture_id: str, timeout_s: float) -> FireReport:
@@ -180,13 +188,13 @@ class SerialTriggerBox:
         A capture that this driver has not armed is asked for at the box: after a crash of the
         program that armed it, for example.
         """
-        flight = self._captures.find(capture_id)
-        if flight is None:
+        capture = self._captures.find(capture_id)
+        if capture is None:
             report = self._stranger(capture_id)
         else:
             with self._captures.resolved:
-                self._captures.resolved.wait_for(lambda: not flight.open, timeout_s)
-            report = flight.report or known_report(flight, self._keeper.view.problem)
+                self._captures.resolved.wait_for(lambda: not capture.open, timeout_s)
+            report = capture.report or known_report(capture, self._connection.view.problem)
         if capture_id in self._armed_ns:
             report = replace(report, wire=self._tape.since(self._armed_ns[capture_id]))
         for listener in list(self._listeners):
@@ -202,13 +210,13 @@ class SerialTriggerBox:
 
     def disarm(self, capture_id: str) -> None:
         """Leave ARMED without a pulse. Nothing happens when it is not armed any more."""
-        flight = self._captures.find(capture_id)
-        if flight is None or not flight.open:
+        capture = self._captures.find(capture_id)
+        if capture is None or not capture.open:
             return
         try:
             self._order(lambda: self._captures.disarm(capture_id))
         except DeviceError:
-            flight.wanted = False
+            capture.wanted = False
             raise
 
     def abort(self) -> None:
@@ -241,7 +249,7 @@ class SerialTriggerBox:
             return job.future.result(PATIENCE_S)
         except TimeoutError:
             job.future.cancel()
-            raise _late(self._keeper.view) from None
+            raise _late(self._connection.view) from None
         except FutureCancelledError:
             raise _closed() from None
 

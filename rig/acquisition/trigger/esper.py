@@ -22,8 +22,8 @@ from dataclasses import dataclass, replace
 from common.errors import ConflictError, DeviceError
 from rig.acquisition.trigger.box import (
     ArmRequest,
+    FireOutcome,
     FireReport,
-    Outcome,
     TriggerCapabilities,
     TriggerHealth,
     TriggerState,
@@ -175,7 +175,7 @@ class EsperTriggerBox:
         deadline = time.monotonic() + timeout_s
         shot = self._shots.get(capture_id)
         if shot is None:
-            report = _report(capture_id, Outcome.UNKNOWN, "this driver has not armed it")
+            report = _report(capture_id, FireOutcome.UNKNOWN, "this driver has not armed it")
         else:
             report = shot.report or self._find_out(shot, deadline)
             report = replace(report, wire=self._tape.since(shot.armed_ns))
@@ -188,11 +188,11 @@ class EsperTriggerBox:
         if shot.sent_ns is None:
             armed = self._armed == capture_id
             why = "FIRE was not given"
-            return _report(capture_id, Outcome.UNKNOWN if armed else Outcome.NOT_FIRED, why)
+            return _report(capture_id, FireOutcome.UNKNOWN if armed else FireOutcome.NOT_FIRED, why)
         ends = shot.sent_ns / 1e9 + shot.program.duration_s
         time.sleep(max(min(ends, deadline) - time.monotonic(), 0.0))
         if time.monotonic() < ends:
-            return _report(capture_id, Outcome.UNKNOWN, "it is firing still")
+            return _report(capture_id, FireOutcome.UNKNOWN, "it is firing still")
         shot.report = self._conclude(capture_id)
         return shot.report
 
@@ -205,10 +205,10 @@ class EsperTriggerBox:
                 if self._half_press:
                     self._order("F0")
             except DeviceError as error:
-                return _report(capture_id, Outcome.UNKNOWN, str(error))
+                return _report(capture_id, FireOutcome.UNKNOWN, str(error))
             self._state = TriggerState.READY
             why = "the order was sent and the box answers, but it does not acknowledge fire"
-            return _report(capture_id, Outcome.FIRED, why)
+            return _report(capture_id, FireOutcome.FIRED, why)
 
     def disarm(self, capture_id: str) -> None:
         """Forget that it is armed, and let the focus lines go."""
@@ -340,13 +340,13 @@ class EsperTriggerBox:
         self._tape(WireLine(time.monotonic_ns(), sent, text))
 
 
-def _report(capture_id: str, outcome: Outcome, why: str) -> FireReport:
+def _report(capture_id: str, outcome: FireOutcome, why: str) -> FireReport:
     return FireReport(
         capture_id=capture_id,
         outcome=outcome,
-        shots_done=1 if outcome is Outcome.FIRED else 0,
+        shots_done=1 if outcome is FireOutcome.FIRED else 0,
         shots_wanted=1,
-        acknowledged=outcome is Outcome.NOT_FIRED,
+        acknowledged=outcome is FireOutcome.NOT_FIRED,
         why=why,
     )
 

@@ -16,7 +16,7 @@ PATIENCE_S = 1.9
 
 
 @dataclass
-class Job:
+class PortJob:
     """One order. ``work`` runs on the owner's thread, before ``deadline_ns`` or not at all."""
 
     work: Callable[[], Any]
@@ -29,7 +29,7 @@ class JobQueue:
     """Orders in turn, urgent ones first. ``handle`` is readable when there is something to do."""
 
     def __init__(self) -> None:
-        self._jobs: deque[Job] = deque()
+        self._jobs: deque[PortJob] = deque()
         self._lock = threading.Lock()
         self._read, self._write = os.pipe()
         os.set_blocking(self._write, False)
@@ -46,9 +46,9 @@ class JobQueue:
         """To wait on."""
         return self._read
 
-    def put(self, work: Callable[[], Any], urgent: bool = False) -> Job:
+    def put(self, work: Callable[[], Any], urgent: bool = False) -> PortJob:
         """A new order."""
-        job = Job(work, time.monotonic_ns() + int(PATIENCE_S * 1e9), urgent)
+        job = PortJob(work, time.monotonic_ns() + int(PATIENCE_S * 1e9), urgent)
         with self._lock:
             if self._closed:
                 job.future.cancel()
@@ -60,7 +60,7 @@ class JobQueue:
         self.wake()
         return job
 
-    def take(self) -> Job | None:
+    def take(self) -> PortJob | None:
         """The next order that its giver still waits for."""
         while True:
             with self._lock:

@@ -83,7 +83,7 @@ def seal(body: str, limit: int = MAX_REQUEST) -> bytes:
     return line
 
 
-class Check(Enum):
+class Checksum(Enum):
     """What the checksum of a line says."""
 
     GOOD = "good"
@@ -91,7 +91,7 @@ class Check(Enum):
     ABSENT = "absent"
 
 
-def unseal(text: str) -> tuple[str, Check]:
+def unseal(text: str) -> tuple[str, Checksum]:
     """A line's body, and whether it had a checksum that fits.
 
     Only `` *`` and four upper-case hexadecimal digits at the very end are a checksum, so
@@ -99,10 +99,10 @@ def unseal(text: str) -> tuple[str, Check]:
     """
     found = _CHECKED.fullmatch(text)
     if found is None:
-        return text, Check.ABSENT
+        return text, Checksum.ABSENT
     body = found[1]
     good = crc16(body.encode("ascii", "replace")) == int(found[2], 16)
-    return body, Check.GOOD if good else Check.WRONG
+    return body, Checksum.GOOD if good else Checksum.WRONG
 
 
 @dataclass(frozen=True)

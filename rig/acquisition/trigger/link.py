@@ -43,7 +43,7 @@ class Answer:
     received_ns: int
 
 
-class Link:
+class RequestLink:
     """Requests and replies over one open port. Used by one thread.
 
     ``on_event`` hears events while anything is being read; it must not ask the box itself.

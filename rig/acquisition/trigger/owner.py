@@ -10,11 +10,11 @@ from concurrent.futures import Future
 from common.errors import DeviceError, RigwrightError
 from rig.acquisition.trigger.box import TriggerState
 from rig.acquisition.trigger.captures import Captures
-from rig.acquisition.trigger.jobs import Job, JobQueue
-from rig.acquisition.trigger.keeper import Keeper
+from rig.acquisition.trigger.client import RefusedError
+from rig.acquisition.trigger.connection import Connection
+from rig.acquisition.trigger.jobs import JobQueue, PortJob
 from rig.acquisition.trigger.link import NoAnswerError
 from rig.acquisition.trigger.serialline import LineLostError, SerialLine
-from rig.acquisition.trigger.talk import RefusedError
 
 PROBE_S = 8.0
 """How long a box may take from the opening of its port to its first answer: an Uno is reset by
@@ -36,13 +36,13 @@ class PortOwner:
 
     def __init__(
         self,
-        keeper: Keeper,
+        connection: Connection,
         captures: Captures,
         queue: JobQueue,
         open_line: Callable[[], SerialLine],
     ) -> None:
         self.opened: Future[None] = Future()
-        self._keeper = keeper
+        self._connection = connection
         self._captures = captures
         self._queue = queue
         self._open_line = open_line
@@ -68,7 +68,7 @@ class PortOwner:
             while not self._closing.is_set():
                 self._turn()
         except Exception as error:  # whatever it is, those who wait must hear of it
-            self._keeper.view.problem = f"internal fault: {error!r}"
+            self._connection.view.problem = f"internal fault: {error!r}"
             self._fail_opening(error)
             raise
         finally:
@@ -93,15 +93,15 @@ class PortOwner:
     # -- connection --------------------------------------------------------------------------
 
     def _connect(self) -> None:
-        self._keeper.view.state = TriggerState.OPENING
+        self._connection.view.state = TriggerState.OPENING
         self._line = self._open_line()
-        self._keeper.attach(self._line)
+        self._connection.attach(self._line)
         self._probe_until_ns = time.monotonic_ns() + int(PROBE_S * 1e9)
 
     def _probe(self) -> None:
         began = time.monotonic()
         try:
-            self._keeper.meet()
+            self._connection.meet()
             self._captures.met()
         except (NoAnswerError, RefusedError) as problem:
             if time.monotonic_ns() > self._probe_until_ns:
@@ -111,7 +111,7 @@ class PortOwner:
             return
         self._met = True
         self._backoff_s = BACKOFF_S[0]
-        self._keeper.view.problem = ""
+        self._connection.view.problem = ""
         if not self.opened.done():
             self.opened.set_result(None)
 
@@ -119,16 +119,16 @@ class PortOwner:
         """The port is there, the box silent. It is not closed: opening it would reset an Uno."""
         if self._met:
             self._met = False
-            self._keeper.metrics.count("reconnects")
-            self._keeper.view.problem = problem
-            self._keeper.view.state = TriggerState.PROBING
+            self._connection.metrics.count("reconnects")
+            self._connection.view.problem = problem
+            self._connection.view.state = TriggerState.PROBING
             self._probe_until_ns = time.monotonic_ns() + int(PROBE_S * 1e9)
 
     def _lose(self, error: DeviceError) -> None:
         if self._met:
-            self._keeper.metrics.count("reconnects")
+            self._connection.metrics.count("reconnects")
         self._drop_line()
-        self._keeper.view.problem = str(error)
+        self._connection.view.problem = str(error)
         if self._fail_opening(error):
             self._closing.set()
             return
@@ -143,7 +143,7 @@ class PortOwner:
 
     def _drop_line(self) -> None:
         self._met = False
-        self._keeper.detach()
+        self._connection.detach()
         if self._line is not None:
             self._line.close()
             self._line = None
@@ -152,7 +152,7 @@ class PortOwner:
         """Wait, and meanwhile tell those who wait for the box that it is gone."""
         until = time.monotonic() + seconds
         while not self._closing.is_set():
-            problem = self._keeper.view.problem or "the box is being looked for"
+            problem = self._connection.view.problem or "the box is being looked for"
             self._queue.fail_overdue(_gone(problem), _HOPELESS_S)
             left = until - time.monotonic()
             if left <= 0.0:
@@ -169,11 +169,11 @@ class PortOwner:
             self._listen()
         self._captures.hear()
 
-    def _do(self, job: Job) -> None:
+    def _do(self, job: PortJob) -> None:
         if job.deadline_ns - time.monotonic_ns() < _SHORTEST_S * 1e9:
             job.future.set_exception(_gone("the box was busy for too long"))
             return
-        link = self._keeper.talk.link
+        link = self._connection.client.link
         link.deadline_ns = job.deadline_ns - int(0.05e9)
         try:
             job.future.set_result(job.work())
@@ -193,20 +193,20 @@ class PortOwner:
     def _housekeep(self) -> bool:
         """Do one thing that is due; whether there was one."""
         now = time.monotonic_ns()
-        keeper, captures = self._keeper, self._captures
+        connection, captures = self._connection, self._captures
         try:
-            if keeper.boot_doubted:
-                if keeper.check_boot():
+            if connection.boot_doubted:
+                if connection.check_boot():
                     captures.met()
-            elif keeper.fetch_missing():
+            elif connection.fetch_missing():
                 return True
             elif captures.resolve_due_ns is not None and captures.resolve_due_ns <= now:
                 captures.resolve()
-            elif keeper.status_due_ns <= now:
-                keeper.look()
-                keeper.fit()
-            elif self._may_sample() and keeper.sample_due_ns <= now:
-                keeper.sample()
+            elif connection.status_due_ns <= now:
+                connection.look()
+                connection.fit()
+            elif self._may_sample() and connection.sample_due_ns <= now:
+                connection.sample()
             else:
                 return False
         except RefusedError as refused:
@@ -214,16 +214,16 @@ class PortOwner:
         return True
 
     def _may_sample(self) -> bool:
-        return self._keeper.view.state is not TriggerState.FIRING
+        return self._connection.view.state is not TriggerState.FIRING
 
     def _listen(self) -> None:
-        due = [self._keeper.status_due_ns]
+        due = [self._connection.status_due_ns]
         if self._may_sample():
-            due.append(self._keeper.sample_due_ns)
+            due.append(self._connection.sample_due_ns)
         if self._captures.resolve_due_ns is not None:
             due.append(self._captures.resolve_due_ns)
         patience_s = (min(due) - time.monotonic_ns()) / 1e9
-        self._keeper.talk.link.listen(min(max(patience_s, 0.0), _LISTEN_S))
+        self._connection.client.link.listen(min(max(patience_s, 0.0), _LISTEN_S))
 
 
 def _gone(problem: str) -> DeviceError:

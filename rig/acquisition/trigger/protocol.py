@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 from rig.acquisition.trigger.lines import (
     MAX_ANSWER,
-    Check,
+    Checksum,
     ErrorCode,
     LineError,
     RawLine,
@@ -92,23 +92,23 @@ def parse_request(line: RawLine) -> ReceivedRequest:
     if not line.sound:
         raise LineError(ErrorCode.CHARACTER, line.text)
     body, check = unseal(line.text)
-    if check is Check.WRONG:
+    if check is Checksum.WRONG:
         raise LineError(ErrorCode.CHECKSUM, line.text)
     words = body.split(" ")
     seq = _sequence(words[0])
     if seq is not None:
         words = words[1:]
-    elif check is Check.GOOD:
+    elif check is Checksum.GOOD:
         raise LineError(ErrorCode.SYNTAX, body)
     if not words or "" in words:
         raise LineError(ErrorCode.SYNTAX, body, seq)
     command = words[0]
     if command not in COMMANDS:
         raise LineError(ErrorCode.COMMAND, body, seq)
-    if check is Check.ABSENT and not (command.endswith("?") or command == "ABORT"):
+    if check is Checksum.ABSENT and not (command.endswith("?") or command == "ABORT"):
         raise LineError(ErrorCode.UNCHECKED, body, seq)
     fields = _arguments(command, words[1:], body, seq)
-    checksum = crc16(body.encode()) if check is Check.GOOD else None
+    checksum = crc16(body.encode()) if check is Checksum.GOOD else None
     return ReceivedRequest(seq, command, fields, checksum)
 
 
@@ -177,8 +177,8 @@ def parse_answer(line: RawLine) -> Reply | Event:
     if not line.sound:
         raise LineError(ErrorCode.CHARACTER, line.text)
     body, check = unseal(line.text)
-    if check is not Check.GOOD:
-        code = ErrorCode.CHECKSUM if check is Check.WRONG else ErrorCode.UNCHECKED
+    if check is not Checksum.GOOD:
+        code = ErrorCode.CHECKSUM if check is Checksum.WRONG else ErrorCode.UNCHECKED
         raise LineError(code, line.text)
     words = body.split(" ")
     if len(words) >= 3 and words[0] == "!":

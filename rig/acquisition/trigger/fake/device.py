@@ -13,10 +13,10 @@ from dataclasses import dataclass, field
 
 from rig.acquisition.trigger.edges import OUTPUTS
 from rig.acquisition.trigger.fake.clock import BoxClock
-from rig.acquisition.trigger.fake.limits import Limits, PhysicalEdge
+from rig.acquisition.trigger.fake.limits import FakeLimits, PhysicalEdge
 from rig.acquisition.trigger.fake.memory import (
     Capture,
-    Captures,
+    CaptureMemory,
     ErrorQueue,
     EventLog,
     Permanent,
@@ -46,7 +46,7 @@ class FakeSettings:
     seed: int = 0
     identity: str = ""
     boot_s: float = 0.0
-    limits: Limits = field(default_factory=Limits)
+    limits: FakeLimits = field(default_factory=FakeLimits)
 
 
 class FakeBox:
@@ -65,7 +65,7 @@ class FakeBox:
         self.emit: Callable[[Event], None] = lambda event: None  # noqa: ARG005
         self.permanent = Permanent(settings.serial_number)
         self.interlock_closed = True
-        self.captures = Captures()
+        self.captures = CaptureMemory()
         self._now_ns = now_ns
         self._random = random.Random(settings.seed)  # noqa: S311 - lateness of a fake
         self._level = 0
@@ -231,7 +231,7 @@ class FakeBox:
             if self.armed is not None:
                 self.armed.result = "PARTIAL" if self.state == "FIRING" else "NOT_FIRED"
             if not keeps_power:
-                self.captures = Captures()
+                self.captures = CaptureMemory()
             self._start(cause)
             self.deaf_until_ns = self._now_ns() + int(self.settings.boot_s * 1e9)
 

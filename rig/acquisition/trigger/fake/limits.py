@@ -8,7 +8,7 @@ from rig.acquisition.trigger.edges import STROBES
 
 
 @dataclass(frozen=True)
-class Limits:
+class FakeLimits:
     """What ``CAP?`` reports, in ticks but ``hold_ms``."""
 
     max_delay: int = 60_000_000

@@ -120,7 +120,7 @@ class ErrorQueue:
         self._codes.clear()
 
 
-class Captures:
+class CaptureMemory:
     """The last few captures, newest last."""
 
     def __init__(self) -> None:

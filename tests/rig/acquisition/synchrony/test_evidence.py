@@ -32,7 +32,7 @@ from rig.acquisition.synchrony.lags import estimate_lags, new_timings
 from rig.acquisition.synchrony.shooting import CameraPart, Shooting
 from rig.acquisition.synchrony.take import Method, Pair, Pairing, Take
 from rig.acquisition.synchrony.verdict import Board, Level, SyncState, gather
-from rig.acquisition.trigger.box import Edge, FireReport, Outcome
+from rig.acquisition.trigger.box import Edge, FireOutcome, FireReport
 
 START = 5 * 10**11
 DEVICE = CameraCapabilities(TriggerKind.EDGE, TimestampKind.DEVICE, True)
@@ -55,7 +55,7 @@ def shooting(
         for k in range(shots)
         for output, p in request.pulses.items()
     )
-    report = FireReport("box", Outcome.FIRED, shots, shots, edges, 5.0)
+    report = FireReport("box", FireOutcome.FIRED, shots, shots, edges, 5.0)
     parts = []
     for plan, lags in zip(station.cameras, lags_us, strict=True):
         instants = tuple(

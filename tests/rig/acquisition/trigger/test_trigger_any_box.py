@@ -12,7 +12,7 @@ import pytest
 from trigger_boxes import AnyBox, opened, request_for, wait_until
 
 from common.errors import ConflictError, DeviceError, InputError, InterlockError
-from rig.acquisition.trigger.box import ArmRequest, Outcome, Pulse, TriggerState
+from rig.acquisition.trigger.box import ArmRequest, FireOutcome, Pulse, TriggerState
 from rig.acquisition.trigger.driver import BoxAddress, SerialTriggerBox
 from rig.acquisition.trigger.endpoint import PtyEndpoint
 from rig.acquisition.trigger.faultscript import FaultRates, Incident, ProxyScript
@@ -25,7 +25,7 @@ def test_a_capture_is_fired_once_and_reported_whole(box_under_test: AnyBox) -> N
         assert driver.health().state is TriggerState.ARMED
         driver.fire("a")
         report = driver.wait_done("a", 2.0)
-        assert report.outcome is Outcome.FIRED
+        assert report.outcome is FireOutcome.FIRED
         assert (report.shots_done, report.shots_wanted) == (2, 2)
         assert report.why == ""
         rising = report.rising_edges(2)
@@ -53,7 +53,7 @@ def test_disarm_makes_no_pulse(box_under_test: AnyBox) -> None:
     with opened(box_under_test.url) as driver:
         driver.arm(request_for("a"))
         driver.disarm("a")
-        assert driver.wait_done("a", 1.0).outcome is Outcome.NOT_FIRED
+        assert driver.wait_done("a", 1.0).outcome is FireOutcome.NOT_FIRED
         driver.disarm("a")
         with pytest.raises(ConflictError):
             driver.fire("a")
@@ -65,12 +65,12 @@ def test_abort_while_armed_and_while_firing(box_under_test: AnyBox) -> None:
         driver.abort()
         driver.arm(request_for("a"))
         driver.abort()
-        assert driver.wait_done("a", 1.0).outcome is Outcome.NOT_FIRED
+        assert driver.wait_done("a", 1.0).outcome is FireOutcome.NOT_FIRED
         driver.arm(request_for("b", late_us=600_000.0))
         driver.fire("b")
         driver.abort()
         report = driver.wait_done("b", 1.0)
-        assert report.outcome is Outcome.PARTIAL
+        assert report.outcome is FireOutcome.PARTIAL
         assert report.shots_done == 0
     assert box_under_test.rises()[3] == 0
 
@@ -79,7 +79,7 @@ def test_the_open_interlock_keeps_everything_off(box_under_test: AnyBox) -> None
     with opened(box_under_test.url) as driver:
         driver.arm(request_for("a"))
         box_under_test.set_interlock(False)
-        assert driver.wait_done("a", 1.5).outcome is Outcome.NOT_FIRED
+        assert driver.wait_done("a", 1.5).outcome is FireOutcome.NOT_FIRED
         with pytest.raises(InterlockError):
             driver.arm(request_for("b"))
         with pytest.raises(InterlockError):
@@ -90,7 +90,7 @@ def test_the_open_interlock_keeps_everything_off(box_under_test: AnyBox) -> None
         driver.reset()
         driver.arm(request_for("c"))
         driver.fire("c")
-        assert driver.wait_done("c", 2.0).outcome is Outcome.FIRED
+        assert driver.wait_done("c", 2.0).outcome is FireOutcome.FIRED
     assert box_under_test.rises()[1] == 1
 
 
@@ -99,11 +99,11 @@ def test_a_reset_while_armed_is_noticed(box_under_test: AnyBox) -> None:
         driver.arm(request_for("a"))
         box_under_test.reset()
         report = driver.wait_done("a", 2.0)
-        assert report.outcome is Outcome.NOT_FIRED
+        assert report.outcome is FireOutcome.NOT_FIRED
         # The box has forgotten its outputs: they must be sent again.
         driver.arm(request_for("b"))
         driver.fire("b")
-        assert driver.wait_done("b", 2.0).outcome is Outcome.FIRED
+        assert driver.wait_done("b", 2.0).outcome is FireOutcome.FIRED
         assert driver.health().counters["reboots"] == 1
     assert box_under_test.rises() == {1: 1, 2: 1, 13: 1}
 
@@ -114,7 +114,7 @@ def test_a_reset_while_firing_is_a_partial_capture(box_under_test: AnyBox) -> No
         driver.fire("a")
         box_under_test.reset()
         report = driver.wait_done("a", 2.0)
-        assert report.outcome is Outcome.PARTIAL
+        assert report.outcome is FireOutcome.PARTIAL
         assert report.shots_done == 0
     assert box_under_test.rises()[3] == 0
 
@@ -123,7 +123,7 @@ def test_expiry(box_under_test: AnyBox) -> None:
     with opened(box_under_test.url) as driver:
         request = request_for("a")
         driver.arm(ArmRequest("a", request.pulses, lead_us=1000.0, expires_s=0.3))
-        assert driver.wait_done("a", 2.0).outcome is Outcome.NOT_FIRED
+        assert driver.wait_done("a", 2.0).outcome is FireOutcome.NOT_FIRED
         with pytest.raises(ConflictError, match="is over"):
             driver.fire("a")
     assert not box_under_test.rises()
@@ -158,7 +158,7 @@ def test_a_lost_fire_line_never_makes_two_pulses(
         driver.arm(request_for("a"))
         driver.fire("a")
         report = driver.wait_done("a", 2.0)
-        assert report.outcome is Outcome.FIRED
+        assert report.outcome is FireOutcome.FIRED
         assert proxy.done["drop"] == 1
         assert ("acknowledgement" in report.why) == (lost == "reply")
     assert box_under_test.rises() == {1: 1, 2: 1, 13: 1}
@@ -172,7 +172,7 @@ def test_unplugged_between_fire_and_its_answer(box_under_test: AnyBox, tmp_path:
         with pytest.raises(DeviceError, match="cannot be reached"):
             driver.fire("a")
         report = driver.wait_done("a", 2.0)
-        assert report.outcome is Outcome.FIRED
+        assert report.outcome is FireOutcome.FIRED
         assert len(report.edges) == 6
         assert driver.health().counters["reconnects"] >= 1
     assert box_under_test.rises() == {1: 1, 2: 1, 13: 1}
@@ -191,7 +191,7 @@ def test_some_fires_through_a_bad_line(box_under_test: AnyBox, tmp_path: Path) -
                 driver.fire(f"a{number}")
             outcomes.append(driver.wait_done(f"a{number}", 2.0).outcome)
         assert sum(proxy.done.values()) > 0
-    fired = outcomes.count(Outcome.FIRED)
+    fired = outcomes.count(FireOutcome.FIRED)
     assert fired >= 6
     assert fired <= box_under_test.rises()[1] <= len(outcomes)
 

@@ -15,11 +15,11 @@ from trigger_boxes import ONE_EACH, fire_whole, named_in_time, opened, request_f
 from common.errors import ConflictError, DeviceError
 from rig.acquisition.trigger import driver as driver_module
 from rig.acquisition.trigger import owner
-from rig.acquisition.trigger.box import ArmRequest, Outcome, Pulse, TriggerState
+from rig.acquisition.trigger.box import ArmRequest, FireOutcome, Pulse, TriggerState
+from rig.acquisition.trigger.connection import Connection
 from rig.acquisition.trigger.driver import BoxAddress, SerialTriggerBox
 from rig.acquisition.trigger.endpoint import PtyEndpoint
 from rig.acquisition.trigger.fake.program import FakeTrigger
-from rig.acquisition.trigger.keeper import Keeper
 from rig.acquisition.trigger.metrics import WireLine
 from rig.acquisition.trigger.program import Program
 
@@ -48,7 +48,7 @@ def test_many_threads_fire_the_same_capture(fake: FakeTrigger, driver: SerialTri
     for thread in threads:
         thread.join()
     assert len(refused) == 7
-    assert driver.wait_done("a", 2.0).outcome is Outcome.FIRED
+    assert driver.wait_done("a", 2.0).outcome is FireOutcome.FIRED
     assert rises(fake) == ONE_EACH
 
 
@@ -68,21 +68,21 @@ def test_an_arming_that_comes_too_late_blocks_nobody(
 ) -> None:
     """A busy computer: who asked has given up by the time the box is armed."""
     held, go = threading.Event(), threading.Event()
-    set_outputs = Keeper.set_outputs
+    set_outputs = Connection.set_outputs
 
-    def slow(keeper: Keeper, program: Program) -> None:
+    def slow(connection: Connection, program: Program) -> None:
         held.set()
         go.wait(2.0)
-        set_outputs(keeper, program)
+        set_outputs(connection, program)
 
     with monkeypatch.context() as patch:
-        patch.setattr(Keeper, "set_outputs", slow)
+        patch.setattr(Connection, "set_outputs", slow)
         patch.setattr(driver_module, "PATIENCE_S", 0.05)
         with named_in_time(DeviceError, "device/trigger-gone"):
             driver.arm(request_for("late"))
         assert held.is_set()
         go.set()
-    assert driver.wait_done("late", 2.0).outcome is Outcome.NOT_FIRED
+    assert driver.wait_done("late", 2.0).outcome is FireOutcome.NOT_FIRED
     fire_whole(driver, "b")
     assert rises(fake) == ONE_EACH
 
@@ -93,7 +93,7 @@ def test_outputs_that_are_not_asked_for_stay_low(
     fire_whole(driver, "a")
     driver.arm(ArmRequest("b", {2: Pulse(100.0, 200.0)}))
     driver.fire("b")
-    assert driver.wait_done("b", 2.0).outcome is Outcome.FIRED
+    assert driver.wait_done("b", 2.0).outcome is FireOutcome.FIRED
     assert rises(fake) == {1: 1, 2: 2, 13: 1}
 
 
@@ -121,7 +121,7 @@ def test_what_an_earlier_program_left_armed_is_disarmed(fake: FakeTrigger) -> No
         owner_of_port.stop()  # as if the program had been killed
         with opened(fake.url) as second:
             assert second.health().state is TriggerState.READY
-            assert second.wait_done("a", 1.0).outcome is Outcome.NOT_FIRED
+            assert second.wait_done("a", 1.0).outcome is FireOutcome.NOT_FIRED
             fire_whole(second, "b")
 
 
@@ -130,9 +130,9 @@ def test_a_capture_of_another_program_is_asked_for(fake: FakeTrigger) -> None:
         fire_whole(first, "a")
     with opened(fake.url) as second:
         report = second.wait_done("a", 1.0)
-        assert report.outcome is Outcome.FIRED
+        assert report.outcome is FireOutcome.FIRED
         assert report.shots_done == 1
-        assert second.wait_done("never", 1.0).outcome is Outcome.UNKNOWN
+        assert second.wait_done("never", 1.0).outcome is FireOutcome.UNKNOWN
 
 
 def test_an_armed_box_is_kept_armed_by_the_heartbeat(
@@ -142,7 +142,7 @@ def test_an_armed_box_is_kept_armed_by_the_heartbeat(
     time.sleep(3.5)
     assert driver.health().state is TriggerState.ARMED
     driver.fire("a")
-    assert driver.wait_done("a", 2.0).outcome is Outcome.FIRED
+    assert driver.wait_done("a", 2.0).outcome is FireOutcome.FIRED
     assert rises(fake) == ONE_EACH
 
 

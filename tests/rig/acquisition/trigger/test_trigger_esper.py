@@ -11,7 +11,7 @@ import pytest
 
 from common.errors import ConflictError, DeviceError, InputError
 from rig.acquisition.trigger import esper
-from rig.acquisition.trigger.box import ArmRequest, Outcome, Pulse, TriggerBox, TriggerState
+from rig.acquisition.trigger.box import ArmRequest, FireOutcome, Pulse, TriggerBox, TriggerState
 from rig.acquisition.trigger.driver import BoxAddress
 from rig.acquisition.trigger.endpoint import PtyEndpoint
 from rig.acquisition.trigger.esper import EsperTriggerBox
@@ -66,7 +66,7 @@ def test_a_capture_is_fired_and_not_claimed_to_be_acknowledged(bench: Bench) -> 
     assert bench.box.health().armed_capture == "a"
     bench.box.fire("a")
     report = bench.box.wait_done("a", 2.0)
-    assert (report.outcome, report.acknowledged) == (Outcome.FIRED, False)
+    assert (report.outcome, report.acknowledged) == (FireOutcome.FIRED, False)
     assert "does not acknowledge" in report.why
     assert report.edges == ()
     assert not bench.fake.focus
@@ -94,13 +94,13 @@ def test_disarm_and_expiry_make_no_pulse(bench: Bench) -> None:
         bench.box.arm(ArmRequest("b", REQUEST.pulses))
     bench.box.disarm("a")
     bench.box.disarm("a")
-    assert bench.box.wait_done("a", 0.1).outcome is Outcome.NOT_FIRED
+    assert bench.box.wait_done("a", 0.1).outcome is FireOutcome.NOT_FIRED
     bench.box.arm(ArmRequest("b", REQUEST.pulses, expires_s=0.05))
-    assert bench.box.wait_done("b", 0.0).outcome is Outcome.UNKNOWN
+    assert bench.box.wait_done("b", 0.0).outcome is FireOutcome.UNKNOWN
     time.sleep(0.1)
     with pytest.raises(ConflictError):
         bench.box.fire("b")
-    assert bench.box.wait_done("never", 0.0).outcome is Outcome.UNKNOWN
+    assert bench.box.wait_done("never", 0.0).outcome is FireOutcome.UNKNOWN
     assert not bench.fake.edges
 
 
@@ -139,7 +139,7 @@ def test_lost_before_fire_and_found_again(bench: Bench) -> None:
     bench.server.replug()
     bench.box.arm(ArmRequest("b", REQUEST.pulses))
     bench.box.fire("b")
-    assert bench.box.wait_done("b", 2.0).outcome is Outcome.FIRED
+    assert bench.box.wait_done("b", 2.0).outcome is FireOutcome.FIRED
 
 
 def test_lost_at_fire_is_unknown(bench: Bench) -> None:
@@ -147,8 +147,8 @@ def test_lost_at_fire_is_unknown(bench: Bench) -> None:
     bench.box.fire("a")
     bench.server.unplug()
     report = bench.box.wait_done("a", 2.0)
-    assert (report.outcome, report.acknowledged) == (Outcome.UNKNOWN, False)
-    assert bench.box.wait_done("a", 2.0).outcome is Outcome.UNKNOWN
+    assert (report.outcome, report.acknowledged) == (FireOutcome.UNKNOWN, False)
+    assert bench.box.wait_done("a", 2.0).outcome is FireOutcome.UNKNOWN
 
 
 def test_another_box_is_refused(bench: Bench) -> None:

@@ -26,8 +26,14 @@ from trigger_boxes import (
 )
 
 from common.errors import ConflictError, DeviceError, RigwrightError
-from rig.acquisition.trigger import keeper, link, owner
-from rig.acquisition.trigger.box import Outcome, TriggerState
+from rig.acquisition.trigger import (
+    connection as connection,
+)
+from rig.acquisition.trigger import (
+    link,
+    owner,
+)
+from rig.acquisition.trigger.box import FireOutcome, TriggerState
 from rig.acquisition.trigger.driver import BoxAddress, SerialTriggerBox
 from rig.acquisition.trigger.endpoint import PtyEndpoint, TcpEndpoint
 from rig.acquisition.trigger.fake.device import FakeSettings
@@ -57,7 +63,7 @@ def test_orders_to_a_box_that_is_not_open() -> None:
     with named_in_time(DeviceError, "device/trigger-gone"):
         _ = driver.capabilities
     assert driver.health().state is TriggerState.DISCONNECTED
-    assert driver.wait_done("a", 0.1).outcome is Outcome.UNKNOWN
+    assert driver.wait_done("a", 0.1).outcome is FireOutcome.UNKNOWN
     driver.close()
 
 
@@ -167,7 +173,7 @@ def test_unplugged_while_armed_and_back_in_time(tmp_path: Path) -> None:
         fake.server.replug()
         wait_until(lambda: driver.health().state is TriggerState.ARMED)
         driver.fire("a")
-        assert driver.wait_done("a", 2.0).outcome is Outcome.FIRED
+        assert driver.wait_done("a", 2.0).outcome is FireOutcome.FIRED
         assert rises(fake) == ONE_EACH
 
 
@@ -179,10 +185,10 @@ def test_unplugged_while_armed_for_good(tmp_path: Path) -> None:
         with named_in_time(DeviceError, "device/trigger-gone"):
             driver.fire("a")
         # FIRE was never sent, and this driver will not send it any more.
-        assert driver.wait_done("a", 0.5).outcome is Outcome.NOT_FIRED
+        assert driver.wait_done("a", 0.5).outcome is FireOutcome.NOT_FIRED
         fake.server.replug()
         wait_until(lambda: driver.health().state is TriggerState.READY, 6.0)
-        assert driver.wait_done("a", 2.0).outcome is Outcome.NOT_FIRED
+        assert driver.wait_done("a", 2.0).outcome is FireOutcome.NOT_FIRED
         assert not rises(fake)
 
 
@@ -200,13 +206,13 @@ def test_unplugged_at_fire_for_good_is_unknown(tmp_path: Path) -> None:
             driver.fire("a")
         began = time.monotonic()
         report = driver.wait_done("a", 1.0)
-        assert report.outcome is Outcome.UNKNOWN
+        assert report.outcome is FireOutcome.UNKNOWN
         assert report.acknowledged is False
         assert "cannot be opened" in report.why
         assert time.monotonic() - began < 1.0 + SLACK_S
         # The truth comes with the cable.
         proxy.replug()
-        wait_until(lambda: driver.wait_done("a", 0.2).outcome is Outcome.NOT_FIRED, 8.0)
+        wait_until(lambda: driver.wait_done("a", 0.2).outcome is FireOutcome.NOT_FIRED, 8.0)
         assert not rises(fake)
 
 
@@ -224,8 +230,8 @@ def test_unplugged_at_any_byte_of_the_fire_line(byte: int, tmp_path: Path) -> No
             outcome = driver.wait_done("a", 3.0).outcome
             made = rises(fake)
             assert (outcome, made) in (
-                (Outcome.FIRED, ONE_EACH),
-                (Outcome.NOT_FIRED, {}),
+                (FireOutcome.FIRED, ONE_EACH),
+                (FireOutcome.NOT_FIRED, {}),
             )
 
 
@@ -261,7 +267,7 @@ def test_the_power_lost_with_the_cable_is_unknown(tmp_path: Path) -> None:
             driver.fire("a")
         fake.box.reset("POWER", keeps_power=False)
         report = driver.wait_done("a", 2.0)
-        assert report.outcome is Outcome.UNKNOWN
+        assert report.outcome is FireOutcome.UNKNOWN
         assert "does not remember" in report.why
         fire_whole(driver, "b")
         # The pulse of the first capture may have been made before the power went, or not.
@@ -272,9 +278,9 @@ def test_the_power_lost_with_the_cable_is_unknown(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("state", "outcome"), [("ARMED", Outcome.NOT_FIRED), ("FIRING", Outcome.PARTIAL)]
+    ("state", "outcome"), [("ARMED", FireOutcome.NOT_FIRED), ("FIRING", FireOutcome.PARTIAL)]
 )
-def test_a_box_that_resets_itself(state: str, outcome: Outcome) -> None:
+def test_a_box_that_resets_itself(state: str, outcome: FireOutcome) -> None:
     with start_fake(faults=FakeFaults(reset_in=state)) as fake, opened(fake.url) as driver:
         try:
             driver.arm(request_for("a", shots=2, late_us=50_000.0))
@@ -290,7 +296,7 @@ def test_a_box_that_resets_itself(state: str, outcome: Outcome) -> None:
 def test_a_reset_whose_banner_is_lost_is_found_by_the_clock(
     fake: FakeTrigger, driver: SerialTriggerBox, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(keeper, "HEARTBEAT_S", 0.1)
+    monkeypatch.setattr(connection, "HEARTBEAT_S", 0.1)
     fire_whole(driver, "a")
     time.sleep(0.5)
     emit, fake.box.emit = fake.box.emit, lambda _: None
@@ -336,10 +342,10 @@ def test_bad_lines(fault: str) -> None:
             outcome = driver.wait_done(capture, 2.0).outcome
             made = rises(fake) - before
             assert max(made.values(), default=0) <= 1
-            if outcome is Outcome.FIRED:
+            if outcome is FireOutcome.FIRED:
                 assert made == ONE_EACH
                 fired += 1
-            elif outcome is Outcome.NOT_FIRED:
+            elif outcome is FireOutcome.NOT_FIRED:
                 assert not made
         assert proxy.done[fault] > 0
     assert fired >= 2
@@ -410,7 +416,10 @@ def test_a_socket_closed_by_the_other_side_is_noticed() -> None:
             proxy.unplug()
             with named_in_time(DeviceError, "device/trigger-gone"):
                 driver.fire("a")
-            assert driver.wait_done("a", 0.2).outcome in (Outcome.NOT_FIRED, Outcome.UNKNOWN)
+            assert driver.wait_done("a", 0.2).outcome in (
+                FireOutcome.NOT_FIRED,
+                FireOutcome.UNKNOWN,
+            )
         assert not rises(fake)
 
 
@@ -436,7 +445,7 @@ def test_a_box_with_bad_manners(faults: FakeFaults) -> None:
             capture = f"a{number}"
             driver.arm(request_for(capture))
             driver.fire(capture)
-            assert driver.wait_done(capture, 3.0).outcome is Outcome.FIRED
+            assert driver.wait_done(capture, 3.0).outcome is FireOutcome.FIRED
             assert rises(fake) - before == ONE_EACH
 
 
@@ -457,8 +466,8 @@ def test_a_box_that_falls_silent() -> None:
             assert time.monotonic() - began < 2.0 * (PROMPT_S + SLACK_S)
             report = driver.wait_done(capture, 0.3)
             made = rises(fake) - before
-            assert report.outcome is not Outcome.FIRED or made == ONE_EACH
-            assert report.outcome is not Outcome.NOT_FIRED or not made
+            assert report.outcome is not FireOutcome.FIRED or made == ONE_EACH
+            assert report.outcome is not FireOutcome.NOT_FIRED or not made
             if problem is not None:
                 break
         assert problem is not None

@@ -9,7 +9,7 @@ import pytest
 from trigger_boxes import any_box, box_kinds, request_for
 
 from benchmarks.fires import Shooter, Tally, fire_all, fire_side_by_side, judge, table, write_table
-from rig.acquisition.trigger.box import FireReport, Outcome
+from rig.acquisition.trigger.box import FireOutcome, FireReport
 from rig.acquisition.trigger.driver import BoxAddress, SerialTriggerBox
 from rig.acquisition.trigger.endpoint import PtyEndpoint
 from rig.acquisition.trigger.faultscript import FaultRates, ProxyScript
@@ -56,10 +56,10 @@ def test_fires_of_the_firmware(kind: str, tmp_path: Path) -> None:
     fired = 0
     for capture, report in shooter.reports.items():
         request = shooter.asked[capture]
-        assert report.outcome is not Outcome.PARTIAL
-        if report.outcome is not Outcome.NOT_FIRED:
+        assert report.outcome is not FireOutcome.PARTIAL
+        if report.outcome is not FireOutcome.NOT_FIRED:
             wanted.update(dict.fromkeys(request.pulses, request.shots))
-        fired += report.outcome is Outcome.FIRED
+        fired += report.outcome is FireOutcome.FIRED
     assert fired >= 95
     assert all(made[output] <= count for output, count in wanted.items())
     if fired == len(shooter.reports):
@@ -69,12 +69,12 @@ def test_fires_of_the_firmware(kind: str, tmp_path: Path) -> None:
 def test_the_judge_sees_what_is_wrong() -> None:
     shooter = Shooter(SerialTriggerBox(BoxAddress("loop://")), "x", seed=1)
     truth = {
-        "whole": (Outcome.FIRED, {1: 1, 2: 1, 13: 1}),
-        "doubled": (Outcome.FIRED, {1: 2, 2: 1, 13: 1}),
-        "lacking": (Outcome.FIRED, {1: 1, 2: 1}),
-        "denied": (Outcome.NOT_FIRED, {1: 1}),
-        "stray": (Outcome.UNKNOWN, {5: 1}),
-        "never": (Outcome.UNKNOWN, {}),
+        "whole": (FireOutcome.FIRED, {1: 1, 2: 1, 13: 1}),
+        "doubled": (FireOutcome.FIRED, {1: 2, 2: 1, 13: 1}),
+        "lacking": (FireOutcome.FIRED, {1: 1, 2: 1}),
+        "denied": (FireOutcome.NOT_FIRED, {1: 1}),
+        "stray": (FireOutcome.UNKNOWN, {5: 1}),
+        "never": (FireOutcome.UNKNOWN, {}),
     }
     for capture, (outcome, _) in truth.items():
         shooter.asked[capture] = request_for(capture)

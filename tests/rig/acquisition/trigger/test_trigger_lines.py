@@ -13,7 +13,7 @@ from common.errors import InputError
 from rig.acquisition.trigger.lines import (
     MAX_ANSWER,
     MAX_REQUEST,
-    Check,
+    Checksum,
     ErrorCode,
     LineError,
     LineReader,
@@ -113,7 +113,7 @@ def test_one_or_two_flipped_bits_never_make_another_checked_request(
 @given(st.binary(max_size=40).filter(lambda data: b"\n" not in data))
 def test_a_sealed_body_is_recognised(data: bytes) -> None:
     body = data.hex()
-    assert unseal(seal(body, 127)[:-1].decode()) == (body, Check.GOOD)
+    assert unseal(seal(body, 127)[:-1].decode()) == (body, Checksum.GOOD)
 
 
 def test_the_known_checksum() -> None:

@@ -5,23 +5,26 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from rig.acquisition.trigger.box import Edge, FireReport, Outcome
+from rig.acquisition.trigger.box import Edge, FireOutcome, FireReport
+from rig.acquisition.trigger.client import (
+    BoxResult,
+    EdgeLog,
+)
 from rig.acquisition.trigger.clock import ClockFit
 from rig.acquisition.trigger.edges import OUTPUTS
 from rig.acquisition.trigger.program import Program
 from rig.acquisition.trigger.protocol import TICK_NS
-from rig.acquisition.trigger.talk import BoxResult, EdgeLog
 
 OUTCOMES = {
-    "FIRED": Outcome.FIRED,
-    "PARTIAL": Outcome.PARTIAL,
-    "NOT_FIRED": Outcome.NOT_FIRED,
+    "FIRED": FireOutcome.FIRED,
+    "PARTIAL": FireOutcome.PARTIAL,
+    "NOT_FIRED": FireOutcome.NOT_FIRED,
 }
 
 
 @dataclass
-class Flight:
-    """A capture in flight; written by the thread that owns the port.
+class ArmedCapture:
+    """A capture from ARM to its report; written by the thread that owns the port.
 
     ``wanted`` falls when who asked has given up before it was fired: it is disarmed then.
     """
@@ -51,55 +54,55 @@ class Flight:
         return self.report is None
 
 
-def plain_report(flight: Flight, outcome: Outcome, why: str) -> FireReport:
+def plain_report(capture: ArmedCapture, outcome: FireOutcome, why: str) -> FireReport:
     """A report without an edge log."""
-    done = flight.result.shots_done if flight.result is not None else 0
+    done = capture.result.shots_done if capture.result is not None else 0
     return FireReport(
-        capture_id=flight.id,
+        capture_id=capture.id,
         outcome=outcome,
         shots_done=done,
-        shots_wanted=flight.program.shots,
-        acknowledged=flight.result is not None or not flight.fire_sent,
-        why="; ".join([why, *flight.notes]),
+        shots_wanted=capture.program.shots,
+        acknowledged=capture.result is not None or not capture.fire_sent,
+        why="; ".join([why, *capture.notes]),
     )
 
 
-def full_report(flight: Flight, result: BoxResult, log: EdgeLog | None) -> FireReport:
+def full_report(capture: ArmedCapture, result: BoxResult, log: EdgeLog | None) -> FireReport:
     """The report of a capture whose result the box has given.
 
     Without ``log``, or without a clock for it, the edges are left out and ``why`` says so.
     """
-    notes = list(flight.notes)
+    notes = list(capture.notes)
     edges: tuple[Edge, ...] = ()
     uncertainty_us = float("nan")
-    if log is not None and flight.fit is not None:
-        edges = tuple(host_edges(log, flight.fit))
-        middle = result.start_ticks + flight.program.total // 2
-        uncertainty_us = flight.fit.uncertainty_us(middle * TICK_NS)
-        if tuple(edge for edge, _ in log.edges) != flight.program.edges:
+    if log is not None and capture.fit is not None:
+        edges = tuple(host_edges(log, capture.fit))
+        middle = result.start_ticks + capture.program.total // 2
+        uncertainty_us = capture.fit.uncertainty_us(middle * TICK_NS)
+        if tuple(edge for edge, _ in log.edges) != capture.program.edges:
             notes.append("the box's list of edges is not the one that was asked for")
     elif result.shots_done:
         notes.append("the edge log could not be had")
     return FireReport(
-        capture_id=flight.id,
+        capture_id=capture.id,
         outcome=OUTCOMES[result.result],
         shots_done=result.shots_done,
-        shots_wanted=flight.program.shots,
+        shots_wanted=capture.program.shots,
         edges=edges,
         clock_uncertainty_us=uncertainty_us,
         why="; ".join(notes),
     )
 
 
-def known_report(flight: Flight, problem: str) -> FireReport:
+def known_report(capture: ArmedCapture, problem: str) -> FireReport:
     """The best word on a capture whose report is not there in time."""
-    if flight.result is not None:
-        return full_report(flight, flight.result, None)
-    if flight.fire_sent:
-        return plain_report(flight, Outcome.UNKNOWN, problem or "the box has not answered yet")
-    if flight.wanted:
-        return plain_report(flight, Outcome.UNKNOWN, "it is armed still; FIRE was not given")
-    return plain_report(flight, Outcome.NOT_FIRED, "FIRE was never sent")
+    if capture.result is not None:
+        return full_report(capture, capture.result, None)
+    if capture.fire_sent:
+        return plain_report(capture, FireOutcome.UNKNOWN, problem or "the box has not answered yet")
+    if capture.wanted:
+        return plain_report(capture, FireOutcome.UNKNOWN, "it is armed still; FIRE was not given")
+    return plain_report(capture, FireOutcome.NOT_FIRED, "FIRE was never sent")
 
 
 def stranger_report(capture_id: str, result: BoxResult | None, why: str) -> FireReport:
@@ -107,7 +110,7 @@ def stranger_report(capture_id: str, result: BoxResult | None, why: str) -> Fire
     known = result is not None
     return FireReport(
         capture_id=capture_id,
-        outcome=OUTCOMES.get(result.result, Outcome.UNKNOWN) if result else Outcome.UNKNOWN,
+        outcome=OUTCOMES.get(result.result, FireOutcome.UNKNOWN) if result else FireOutcome.UNKNOWN,
         shots_done=result.shots_done if result else 0,
         shots_wanted=result.shots_wanted if result else 0,
         acknowledged=known,

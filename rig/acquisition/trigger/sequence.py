@@ -8,7 +8,7 @@ _OLD = 1000
 """An event this little behind the last one is an old one; farther is a new count."""
 
 
-class EventWatch:
+class EventSequence:
     """Compares each event's number with the last one's."""
 
     def __init__(self) -> None:

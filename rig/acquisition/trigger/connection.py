@@ -1,6 +1,6 @@
 """Keeps one box connected and known: which box, which start, what state, what time it has.
 
-Everything here runs on the one thread that owns the port; :attr:`Keeper.view` may be read by
+Everything here runs on the one thread that owns the port; :attr:`Connection.view` may be read by
 any.
 """
 
@@ -13,14 +13,19 @@ from dataclasses import dataclass
 
 from common.errors import DeviceError
 from rig.acquisition.trigger.box import TriggerState
+from rig.acquisition.trigger.client import (
+    BoxClient,
+    BoxStatus,
+    Identity,
+    RefusedError,
+)
 from rig.acquisition.trigger.clock import ClockFit, ClockModel
-from rig.acquisition.trigger.link import Link, NoAnswerError
+from rig.acquisition.trigger.link import NoAnswerError, RequestLink
 from rig.acquisition.trigger.metrics import Metrics, WireLog
 from rig.acquisition.trigger.program import BoxLimits, Program
 from rig.acquisition.trigger.protocol import Event
+from rig.acquisition.trigger.sequence import EventSequence
 from rig.acquisition.trigger.serialline import SerialLine
-from rig.acquisition.trigger.talk import Identity, RefusedError, Status, Talk
-from rig.acquisition.trigger.watch import EventWatch
 
 STATES = {
     "IDLE": TriggerState.READY,
@@ -52,7 +57,7 @@ class BoxView:
     problem: str = ""
 
 
-class Keeper:
+class Connection:
     """One box behind one open line. ``heard`` are events not yet looked at."""
 
     def __init__(self, expected_serial: str, metrics: Metrics, wire_log: WireLog | None) -> None:
@@ -63,32 +68,32 @@ class Keeper:
         self.status_due_ns = 0
         self._expected_serial = expected_serial
         self._wire_log = wire_log
-        self._talk: Talk | None = None
-        self._watch = EventWatch()
+        self._client: BoxClient | None = None
+        self._sequence = EventSequence()
         self._missing: deque[int] = deque()
         self._outputs: dict[int, tuple[int, int]] = {}
         self._boot_doubted = False
-        self._last_status: Status | None = None
+        self._last_status: BoxStatus | None = None
         self._sample_due_ns = 0
 
     @property
-    def talk(self) -> Talk:
+    def client(self) -> BoxClient:
         """The box, to be asked; :class:`NoAnswerError` when there is no line."""
-        if self._talk is None:
+        if self._client is None:
             raise NoAnswerError("no line")
-        return self._talk
+        return self._client
 
     # -- connecting --------------------------------------------------------------------------
 
     def attach(self, line: SerialLine) -> None:
         """A line has been opened; :meth:`meet` comes next."""
-        self._talk = Talk(Link(line, self.metrics, self._hear, self._wire_log))
+        self._client = BoxClient(RequestLink(line, self.metrics, self._hear, self._wire_log))
         self.view.state = TriggerState.PROBING
-        self.talk.link.clear_line()
+        self.client.link.clear_line()
 
     def detach(self) -> None:
         """The line is gone."""
-        self._talk = None
+        self._client = None
         self.view.state = TriggerState.DISCONNECTED
 
     def meet(self) -> None:
@@ -96,14 +101,14 @@ class Keeper:
 
         Raises :class:`~common.errors.DeviceError` ``device/trigger-wrong`` for another box.
         """
-        identity = self.talk.identify()
+        identity = self.client.identify()
         self._check_serial(identity)
-        self.view.limits = self.talk.limits()
+        self.view.limits = self.client.limits()
         self.view.identity = identity
         self._expected_serial = identity.serial_number
         self.check_boot()
         status = self.look()
-        self._watch.restart(status.last_event)
+        self._sequence.restart(status.last_event)
         for _ in range(SAMPLES_AT_CONNECT - min(len(self.clock), SAMPLES_AT_CONNECT - 2)):
             self.sample()
         self.fit()
@@ -119,9 +124,9 @@ class Keeper:
 
     # -- knowing -----------------------------------------------------------------------------
 
-    def look(self) -> Status:
+    def look(self) -> BoxStatus:
         """Ask for its state."""
-        status = self.talk.status()
+        status = self.client.status()
         self.status_due_ns = time.monotonic_ns() + int(HEARTBEAT_S * 1e9)
         self.view.state = STATES.get(status.state, TriggerState.FAULT)
         self.view.interlock_closed = status.interlock_closed
@@ -131,7 +136,7 @@ class Keeper:
             self._boot_doubted = True
         return status
 
-    def _jumped(self, last: Status, status: Status) -> bool:
+    def _jumped(self, last: BoxStatus, status: BoxStatus) -> bool:
         limits = self.view.limits
         tick_ns = limits.tick_ns if limits is not None else 500
         box_s = (status.ticks - last.ticks) * tick_ns / 1e9
@@ -140,7 +145,7 @@ class Keeper:
 
     def check_boot(self) -> bool:
         """Whether the box was started anew since it was last asked; then nothing holds."""
-        boots = self.talk.boots()
+        boots = self.client.boots()
         self._boot_doubted = False
         restarted = self.view.boots is not None and boots != self.view.boots
         self.view.boots = boots
@@ -149,7 +154,7 @@ class Keeper:
             self._outputs.clear()
             self.clock.clear()
             self._last_status = None
-            self._watch.restart(None)
+            self._sequence.restart(None)
             self._missing.clear()
         return restarted
 
@@ -167,7 +172,7 @@ class Keeper:
         for output, (delay, width) in program.pulses.items():
             if self._outputs.get(output) != (delay, width):
                 self._outputs.pop(output, None)
-                self.talk.set_output(output, delay, width)
+                self.client.set_output(output, delay, width)
                 self._outputs[output] = (delay, width)
 
     def fetch_missing(self) -> bool:
@@ -175,8 +180,8 @@ class Keeper:
         if not self._missing:
             return False
         number = self._missing.popleft()
-        event = self.talk.event(number)
-        if self._watch.fetched(number) and event is not None:
+        event = self.client.event(number)
+        if self._sequence.fetched(number) and event is not None:
             self._note(event)
         return True
 
@@ -185,7 +190,7 @@ class Keeper:
     def sample(self) -> None:
         """Take one reading of its clock; a lost one does not matter."""
         with suppress(NoAnswerError, RefusedError):
-            self.clock.add(self.talk.clock_sample())
+            self.clock.add(self.client.clock_sample())
         pause_s = QUICK_S if len(self.clock) < FULL_CLOCK else SLOW_S
         self._sample_due_ns = time.monotonic_ns() + int(pause_s * 1e9)
 
@@ -205,10 +210,10 @@ class Keeper:
     def _hear(self, event: Event) -> None:
         self.metrics.count("events")
         if event.name == "BOOT":
-            self._watch.restart(event.number)
+            self._sequence.restart(event.number)
             self._boot_doubted = True
             return
-        new, missing = self._watch.accept(event.number)
+        new, missing = self._sequence.accept(event.number)
         if missing:
             self.metrics.count("events_lost", len(missing))
             self._missing.extend(missing)

@@ -9,7 +9,7 @@ from common.errors import DeviceError
 from rig.acquisition.cameras.base import ClockSample
 from rig.acquisition.trigger.edges import OutputEdge
 from rig.acquisition.trigger.lines import ErrorCode, LineError
-from rig.acquisition.trigger.link import Answer, Link, NoAnswerError
+from rig.acquisition.trigger.link import Answer, NoAnswerError, RequestLink
 from rig.acquisition.trigger.program import BoxLimits, Program
 from rig.acquisition.trigger.protocol import TICK_NS, TIME_PAD, Event, Reply, instant_ticks
 
@@ -24,7 +24,7 @@ class Identity:
 
 
 @dataclass(frozen=True)
-class Status:
+class BoxStatus:
     """``STAT?``. ``capture`` is the one armed or last known."""
 
     state: str
@@ -67,14 +67,14 @@ class RefusedError(Exception):
         self.fields = reply.fields
 
 
-class Talk:
+class BoxClient:
     """Questions and orders to one box. Used by one thread.
 
     All raise :class:`NoAnswerError` and the line's error; :class:`RefusedError` when the box
     says no.
     """
 
-    def __init__(self, link: Link) -> None:
+    def __init__(self, link: RequestLink) -> None:
         self.link = link
 
     def identify(self, tries: int = 1) -> Identity:
@@ -97,12 +97,12 @@ class Talk:
         """How often it has been started."""
         return _whole(self._ask("BOOT?").reply.fields, "n")
 
-    def status(self) -> Status:
+    def status(self) -> BoxStatus:
         """How it is."""
         answer = self._ask("STAT?")
         fields = answer.reply.fields
         capture = fields.get("cap", "-")
-        return Status(
+        return BoxStatus(
             state=fields.get("st", ""),
             interlock_closed=fields.get("il") == "CLOSED",
             capture=None if capture == "-" else capture,
