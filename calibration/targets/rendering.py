@@ -17,12 +17,11 @@ from threadpoolctl import threadpool_limits
 
 from calibration.targets.patterns import SOFTNESS, Pattern
 from geometry.arrays import Floats
-from geometry.camera import Camera, distort, undistort
+from geometry.camera import Camera, perspective
 
 SUPERSAMPLING = 4
 _TILE = 64
 _NODES = 9
-_INVERSE_STEPS = 60
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,13 +36,11 @@ class PlacedPattern:
         """Where places (n, 2) of the plane appear, (n, 2)."""
         local = np.column_stack([plane_mm, np.zeros(len(plane_mm))])
         seen = local @ self.rotation_to_camera.T + self.translation_mm
-        normalised = distort(seen[:, :2] / seen[:, 2:], camera.distortion)
-        return np.asarray(normalised * camera.focal_length_px + camera.principal_point_px)
+        return camera.pixels(perspective(seen))
 
     def plane(self, camera: Camera, pixels: Floats) -> Floats:
         """Places (n, 2) of the plane behind pixels (n, 2)."""
-        normalised = (pixels - camera.principal_point_px) / camera.focal_length_px
-        straight = undistort(normalised, camera.distortion, _INVERSE_STEPS)
+        straight = camera.normalised(pixels)
         to_plane = np.linalg.inv(
             np.column_stack([self.rotation_to_camera[:, :2], self.translation_mm])
         )

@@ -12,7 +12,7 @@ import numpy as np
 
 from common.errors import InputError
 from geometry.arrays import Floats
-from geometry.camera import Camera, RigCamera
+from geometry.camera import Camera, RigCamera, distort_partials
 from geometry.exchange.base import Cameras, ExportOptions, Files, Format
 from geometry.exchange.conventions import METRES_PER_MM, number_lists, translation_mm
 
@@ -30,11 +30,11 @@ def radtan(camera: Camera, name: str) -> Floats:
         return np.array([k1, k2, p1, p2])
     width, height = camera.image_size_px
     corners = np.array([[0.0, 0.0], [width, 0.0], [0.0, height], [width, height]]) - 0.5
-    rays = camera.rays(corners)
-    reach = float(np.linalg.norm(rays[:, :2] / rays[:, 2:], axis=1).max())
-    r = np.linspace(0.0, reach, 200)[1:]
-    # What counts is the shift in the image, r times the radial factor.
-    powers, wanted = np.stack([r**3, r**5], axis=1), k1 * r**3 + k2 * r**5 + k3 * r**7
+    reach = float(np.linalg.norm(camera.normalised(corners), axis=1).max())
+    outward = np.linspace(0.0, reach, 200)[1:, None] * [1.0, 0.0]
+    # What counts is the shift in the image.
+    shift = distort_partials(outward, camera.distortion)[1][:, 0]
+    powers, wanted = shift[:, :2], shift[:, [0, 1, 4]] @ [k1, k2, k3]
     terms = np.linalg.lstsq(powers, wanted, rcond=None)[0]
     off_px = float(np.abs(powers @ terms - wanted).max() * camera.focal_length_px)
     if off_px > WORST_PX:

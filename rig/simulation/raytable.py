@@ -27,8 +27,7 @@ def ray_table(camera: Camera) -> Singles:
     for top in range(0, height, _ROWS):
         rows = np.arange(top, min(top + _ROWS, height))
         y, x = np.meshgrid(rows.astype(np.float64), np.arange(width, dtype=float), indexing="ij")
-        rays = camera.rays(np.stack([x.ravel(), y.ravel()], axis=1))
-        table[top : top + len(rows)] = (rays[:, :2] / rays[:, 2:]).reshape(len(rows), width, 2)
+        table[top : top + len(rows)] = camera.normalised(np.stack([x, y], axis=-1))
     table.setflags(write=False)
     return table
 

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from geometry.arrays import Bools, Floats, Ints
-from geometry.camera import RigCamera
+from geometry.camera import RigCamera, perspective
 from geometry.raycast import Occluder
 from geometry.surface import SurfacePoints
 from rig.solids.bodies import PlacedBody
@@ -55,8 +55,7 @@ def _edge(points: Floats) -> Ints:
 
 def view_corners(rig_camera: RigCamera, seen_points_mm: Floats) -> Floats:
     """Corners (K, 3) of the view: the projection centre and the outermost seen points (N, 3)."""
-    local = rig_camera.pose.to_camera(seen_points_mm)
-    flat = local[:, :2] / local[:, 2:]
+    flat = perspective(rig_camera.pose.to_camera(seen_points_mm))
     return np.vstack([rig_camera.pose.position_rig_mm, seen_points_mm[_edge(flat)]])
 
 

@@ -1,4 +1,4 @@
-"""The camera: sensor, lens, interior orientation, body. Projections happen here only."""
+"""What a camera is: sensor, lens, interior orientation, body, and its place in a rig."""
 
 from __future__ import annotations
 
@@ -9,40 +9,19 @@ import numpy as np
 
 from common.errors import InputError
 from geometry.arrays import Floats, frozen
+from geometry.camera.projection import (
+    NO_DISTORTION,
+    distort,
+    fold_radius,
+    perspective,
+    undistort,
+)
 from geometry.frames import Pose
-
-NO_DISTORTION = frozen(np.zeros(5))
 
 
 def _require(condition: bool, detail: str, problem: str, remedy: str) -> None:
     if not condition:
         raise InputError(detail, problem, remedy)
-
-
-def distort(normalised: Floats, distortion: Floats) -> Floats:
-    """Brown-Conrady distortion (k1, k2, p1, p2, k3) of normalised coordinates (N, 2), (N, 2)."""
-    k1, k2, p1, p2, k3 = distortion
-    x, y = normalised[..., 0], normalised[..., 1]
-    r2 = x * x + y * y
-    radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
-    dx = 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x)
-    dy = p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y
-    return np.stack([x * radial + dx, y * radial + dy], axis=-1)
-
-
-def undistort(distorted: Floats, distortion: Floats, iterations: int = 50) -> Floats:
-    """Inverse of :func:`distort` by fixed-point iteration, (N, 2).
-
-    Accurate to about 1e-12 where the distortion is invertible, which lenses for measuring
-    are within their frame.
-    """
-    guess = np.array(distorted, dtype=np.float64)
-    for _ in range(iterations):
-        step = distorted - distort(guess, distortion)
-        guess += step
-        if np.abs(step).max(initial=0.0) < 1e-14:
-            break
-    return guess
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,30 +184,42 @@ class Camera:
             f"a frame margin of {margin_px:g} px leaves nothing of the image",
             "give a smaller frame margin_px",
         )
-        edges = [self._normalised(np.full(65, v), ys) for v in (xs[0], xs[-1])]
-        edges += [self._normalised(xs, np.full(65, v)) for v in (ys[0], ys[-1])]
-        left, right, top, bottom = edges
+        edges = [np.stack([np.full(65, v), ys], axis=1) for v in (xs[0], xs[-1])]
+        edges += [np.stack([xs, np.full(65, v)], axis=1) for v in (ys[0], ys[-1])]
+        left, right, top, bottom = (self.normalised(edge) for edge in edges)
+        _require(
+            all(bool(np.isfinite(edge).all()) for edge in (left, right, top, bottom)),
+            "camera-distortion-folds",
+            f"the distortion of camera {self.name!r} turns back on itself within the image",
+            "give the distortion [k1, k2, p1, p2, k3] of a calibration that covers the whole image",
+        )
         return np.array([left[:, 0].max(), right[:, 0].min(), top[:, 1].max(), bottom[:, 1].min()])
 
-    def _normalised(self, x_px: Floats, y_px: Floats) -> Floats:
-        pixels = np.stack([x_px, y_px], axis=-1)
-        return undistort((pixels - self.principal_point_px) / self.focal_length_px, self.distortion)
+    def normalised(self, pixels: Floats) -> Floats:
+        """Undistorted x/z, y/z (..., 2) of pixels (..., 2); NaN where nothing is imaged to them."""
+        distorted = (np.asarray(pixels) - self.principal_point_px) / self.focal_length_px
+        return undistort(distorted, self.distortion)
 
-    def project(self, pose: Pose, points_rig_mm: Floats) -> tuple[Floats, Floats]:
-        """Pixels (N, 2), NaN behind the camera, and depths (N,) of points (N, 3)."""
-        local = pose.to_camera(points_rig_mm)
-        depth = local[:, 2]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            normalised = np.where(depth[:, None] > 0.0, local[:, :2] / depth[:, None], np.nan)
+    def pixels(self, normalised: Floats) -> Floats:
+        """Pixels (..., 2) of x/z, y/z (..., 2); NaN beyond the fold of the distortion."""
         pixels = (
             distort(normalised, self.distortion) * self.focal_length_px + self.principal_point_px
         )
-        return pixels, depth
+        beyond = np.hypot(normalised[..., 0], normalised[..., 1]) > fold_radius(self.distortion)
+        return np.where(beyond[..., None], np.nan, pixels)
+
+    def project(self, pose: Pose, points_rig_mm: Floats) -> tuple[Floats, Floats]:
+        """Pixels (N, 2) and depths (N,) of points (N, 3).
+
+        Pixels are NaN behind the camera and so far aside that the distortion folds back.
+        """
+        local = pose.to_camera(points_rig_mm)
+        return self.pixels(perspective(local)), local[:, 2]
 
     def rays(self, pixels: Floats) -> Floats:
         """Unit directions (N, 3) in the camera frame of pixels (N, 2)."""
         directions = np.ones((len(pixels), 3))
-        directions[:, :2] = self._normalised(pixels[:, 0], pixels[:, 1])
+        directions[:, :2] = self.normalised(pixels)
         return np.asarray(directions / np.linalg.norm(directions, axis=1, keepdims=True))
 
 
