@@ -8,6 +8,9 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from common.progress import Progress, ProgressCallback
+from service.wire import plain
+
 Report = Callable[[dict[str, Any]], None]
 _LINE_EVERY_S = 2.0
 
@@ -59,7 +62,8 @@ class _Lines:
 @contextmanager
 def _bar() -> Iterator[Report]:
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import Progress as Bar
 
     columns = (
         TextColumn("{task.description}"),
@@ -68,7 +72,7 @@ def _bar() -> Iterator[Report]:
         TimeElapsedColumn(),
         TextColumn("{task.fields[details]}", style="dim"),
     )
-    with Progress(*columns, console=Console(stderr=True), transient=True) as shown:
+    with Bar(*columns, console=Console(stderr=True), transient=True) as shown:
         bar = shown.add_task("starting", total=1.0, details="")
 
         def report(progress: dict[str, Any]) -> None:
@@ -80,3 +84,12 @@ def _bar() -> Iterator[Report]:
             )
 
         yield report
+
+
+def told(report: Report) -> ProgressCallback:
+    """The same for work in this process."""
+
+    def tell(progress: Progress, /) -> None:
+        report(plain(progress))
+
+    return tell

@@ -1,4 +1,4 @@
-"""``rigwright design`` and ``rigwright demo``."""
+"""``rigwright design``."""
 
 from __future__ import annotations
 
@@ -7,14 +7,55 @@ import os
 import sys
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import typer
 
-from service.cli.running import new_folder, one_line_errors, run_task
-from service.problems import EXIT_INFEASIBLE
+from service.cli.options import ForceOption, JsonOption, RigOption, ScanArgument, WorkersOption
 
 JSON = dict[str, Any]
+
+
+def design(
+    scan: ScanArgument,
+    rig: RigOption,
+    out: Annotated[
+        Path,
+        typer.Option(metavar="DIR", help="Folder to write the design into.", show_default=False),
+    ],
+    cameras: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            max=500,
+            help="Cameras to place, instead of the rig's number.",
+            show_default=False,
+        ),
+    ] = None,
+    seed: Annotated[
+        int | None, typer.Option(min=0, help="Seed, instead of the rig's.", show_default=False)
+    ] = None,
+    starts: Annotated[
+        int | None,
+        typer.Option(
+            min=1, max=1000, help="Starts to try, instead of the rig's number.", show_default=False
+        ),
+    ] = None,
+    workers: WorkersOption = None,
+    as_json: JsonOption = False,
+    force: ForceOption = False,
+) -> None:
+    """Design a rig: a scan and its limits in, camera poses and a mount layout out.
+
+    When the limits cannot all be met, the nearest design is written and told apart.
+
+    Exit code: 0 done, 2 bad input, 3 limits cannot be met, 130 interrupted.
+
+    Example:  rigwright design head.glb --rig face.toml --out rig --cameras 7
+    """
+    run_design_command(
+        scan, rig, out, Overrides(cameras, seed, starts, workers), as_json=as_json, force=force
+    )
 
 
 @dataclass(frozen=True)
@@ -37,7 +78,7 @@ def run_design_command(
     """Design for ``scan`` and write into ``out``."""
     request = overrides.request() | {"scan_name": scan.name}
     inputs = {"scan": scan, "rig": rig}
-    _design(
+    run_design(
         "service.tasks.designing:design_from_files",
         request,
         inputs,
@@ -47,15 +88,13 @@ def run_design_command(
     )
 
 
-def run_demo_command(out: Path, workers: int | None, *, as_json: bool, force: bool) -> None:
-    """Design the example rig for the bundled head."""
-    request = Overrides(workers=workers).request()
-    _design("service.tasks.designing:demo", request, {}, out, as_json=as_json, force=force)
-
-
-def _design(
+def run_design(
     entry: str, request: JSON, inputs: dict[str, Path], out: Path, *, as_json: bool, force: bool
 ) -> None:
+    """Run the work and show what came of it."""
+    from service.cli.running import new_folder, one_line_errors, run_task
+    from service.problems import EXIT_INFEASIBLE
+
     with one_line_errors():
         with new_folder(out, force=force, spare=inputs.values()) as folder:
             result = run_task(entry, request, inputs, folder)
@@ -72,14 +111,14 @@ def _show(result: JSON, files: dict[str, Path], *, as_json: bool) -> None:
         document = {"result": result, "constraints": constraints, "files": paths}
         sys.stdout.write(json.dumps(document, indent=2) + "\n")
     else:
-        from service.cli import tables
+        from service.cli.tables import design_tables
 
-        tables.print_notes(result)
-        tables.print_figures(result)
-        tables.print_limits(constraints)
+        design_tables.print_notes(result)
+        design_tables.print_figures(result)
+        design_tables.print_limits(constraints)
         if result["conflicts"]:
-            tables.print_conflicts(result)
-        tables.print_files(files)
+            design_tables.print_conflicts(result)
+        design_tables.print_files(files)
     if not result["feasible"]:
         sys.stderr.write(f"rigwright: {_why_infeasible(result)}\n")
 

@@ -1,4 +1,4 @@
-"""``rigwright trigger`` and ``rigwright fake-trigger``: boxes by themselves."""
+"""``rigwright trigger``: looks at a trigger box."""
 
 from __future__ import annotations
 
@@ -6,17 +6,70 @@ import sys
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from common.errors import InputError
-from rig.acquisition.capture.devices import StationDevices
-from rig.acquisition.station.spec import TriggerPlan
-from rig.acquisition.station.stationfile import read_station
-from rig.acquisition.trigger.box import TriggerBox, TriggerCapabilities, TriggerHealth
-from rig.acquisition.trigger.fake.program import FakeOptions, run_fake
-from service.cli.output import NOT_WELL, print_json
-from service.cli.running import one_line_errors
+from service.cli.options import JsonOption
+
+if TYPE_CHECKING:
+    from rig.acquisition.trigger.box import TriggerBox, TriggerCapabilities, TriggerHealth
+
+trigger = typer.Typer(name="trigger", help="Look at a trigger box.", no_args_is_help=True)
+
+
+@trigger.command("selftest")
+def trigger_selftest(
+    url: Annotated[
+        str | None,
+        typer.Option(
+            help="Serial port or pySerial address of a Rigwright box.", show_default=False
+        ),
+    ] = None,
+    station: Annotated[
+        Path | None,
+        typer.Option(
+            "--station",
+            metavar="STATION.toml",
+            help="The station whose box to test.",
+            show_default=False,
+        ),
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Ask a trigger box who and how it is: identity, interlock, clock, round trips. Fires nothing.
+
+    Exit code: 0 all is well, 2 bad input, 4 it does not answer or something is not well.
+
+    Example:  rigwright trigger selftest --url /dev/ttyACM0
+    """
+    run_trigger_selftest_command(url, station, as_json=as_json)
+
+
+@trigger.command("reset")
+def trigger_reset(
+    url: Annotated[
+        str | None,
+        typer.Option(
+            help="Serial port or pySerial address of a Rigwright box.", show_default=False
+        ),
+    ] = None,
+    station: Annotated[
+        Path | None,
+        typer.Option(
+            "--station",
+            metavar="STATION.toml",
+            help="The station whose box to reset.",
+            show_default=False,
+        ),
+    ] = None,
+) -> None:
+    """Let a box leave its fault, once its interlock is closed again. Fires nothing.
+
+    Example:  rigwright trigger reset --url /dev/ttyACM0
+    """
+    run_trigger_reset_command(url, station)
+
 
 WORST_CLOCK_US = 500.0
 """A worse fit of the box's clock than this says that its line is disturbed."""
@@ -24,6 +77,9 @@ WORST_CLOCK_US = 500.0
 
 def run_trigger_selftest_command(url: str | None, station: Path | None, *, as_json: bool) -> None:
     """Open a box and tell how it is."""
+    from service.cli.output import NOT_WELL, print_json
+    from service.cli.running import one_line_errors
+
     with one_line_errors():
         with _open_box(url, station) as box:
             health, capabilities = box.health(), box.capabilities
@@ -38,6 +94,8 @@ def run_trigger_selftest_command(url: str | None, station: Path | None, *, as_js
 
 def run_trigger_reset_command(url: str | None, station: Path | None) -> None:
     """Let a box leave its fault."""
+    from service.cli.running import one_line_errors
+
     with one_line_errors(), _open_box(url, station) as box:
         box.reset()
         sys.stdout.write(f"the box is {box.health().state}\n")
@@ -45,6 +103,11 @@ def run_trigger_reset_command(url: str | None, station: Path | None) -> None:
 
 @contextmanager
 def _open_box(url: str | None, station: Path | None) -> Iterator[TriggerBox]:
+    from common.errors import InputError
+    from rig.acquisition.capture.devices import StationDevices
+    from rig.acquisition.station.spec import TriggerPlan
+    from rig.acquisition.station.stationfile import read_station
+
     if (url is None) == (station is None):
         raise InputError("box", "no box, or two, were named", "give --url or --station")
     plan = TriggerPlan("rigwright", url) if url else read_station(station or Path()).trigger
@@ -80,31 +143,3 @@ def _print_box(health: TriggerHealth, can: TriggerCapabilities) -> None:
 def _box_well(health: TriggerHealth) -> bool:
     residual = health.clock_residual_us
     return health.interlock_closed is not False and (residual is None or residual <= WORST_CLOCK_US)
-
-
-def run_fake_trigger_command(
-    link: Path | None,
-    port: int | None,
-    serial_number: str,
-    seed: int,
-    faults: str,
-    drift_ppm: float,
-) -> None:
-    """Be a box until interrupted."""
-    with one_line_errors():
-        run_fake(
-            FakeOptions(
-                serial_number=serial_number,
-                link=link,
-                port=port,
-                seed=seed,
-                faults=faults,
-                drift_ppm=drift_ppm,
-            ),
-            _say,
-        )
-
-
-def _say(line: str) -> None:
-    sys.stdout.write(line + "\n")
-    sys.stdout.flush()

@@ -1,4 +1,4 @@
-"""What ``rigwright plan`` does."""
+"""``rigwright plan``."""
 
 from __future__ import annotations
 
@@ -6,16 +6,59 @@ import json
 import sys
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import typer
 
-from common.errors import InputError
-from service.cli.output import print_json
-from service.cli.running import new_folder, one_line_errors, run_task
-from service.problems import EXIT_INFEASIBLE
-
 JSON = dict[str, Any]
+
+
+def plan(
+    design: Annotated[
+        Path,
+        typer.Argument(metavar="DESIGN.json", help="The cameras to hold.", show_default=False),
+    ],
+    mount: Annotated[
+        Path,
+        typer.Option(
+            metavar="SYSTEM.toml",
+            help='What to build with; `kind = "t-slot"` is enough.',
+            show_default=False,
+        ),
+    ],
+    out: Annotated[
+        Path, typer.Option(metavar="DIR", help="Folder to write into.", show_default=False)
+    ],
+    scan: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="SCAN",
+            help="The head it was designed for; looked for beside the design without it.",
+            show_default=False,
+        ),
+    ] = None,
+    name: Annotated[str, typer.Option(help="What to call it; as the design without it.")] = "",
+    seed: Annotated[int, typer.Option(min=0, help="Of the trials of tolerances.")] = 0,
+    paper: Annotated[str, typer.Option(help="Of drilling templates: A4 or A3.")] = "A4",
+    step: Annotated[bool, typer.Option("--step", help="Write printed parts as STEP too.")] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print one JSON document instead of tables.")
+    ] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace what is in the folder.")] = False,
+) -> None:
+    """Plan what holds the cameras: parts to cut, drill and print, settings, drawings, steps.
+
+    Settings are rounded to what a person can set, and the loss is told.
+
+    Exit code: 0 done, 2 bad input, 3 something clashes, 130 interrupted.
+
+    Example:  rigwright plan rig/design.json --mount t-slot.toml --out plan
+    """
+    run_plan_command(
+        design, mount, scan, out, Planning(name, seed, paper, step), as_json=as_json, force=force
+    )
+
+
 PAPERS = ("A4", "A3")
 
 
@@ -40,6 +83,10 @@ def run_plan_command(
     force: bool,
 ) -> None:
     """Plan and write into ``out``."""
+    from common.errors import InputError
+    from service.cli.running import new_folder, one_line_errors, run_task
+    from service.problems import EXIT_INFEASIBLE
+
     with one_line_errors():
         if options.paper not in PAPERS:
             raise InputError("paper", f"there is no paper {options.paper!r}", "give A4 or A3")
@@ -54,6 +101,8 @@ def run_plan_command(
 
 def _scan_beside(design: Path) -> Path:
     """The scan that a design names, in the design's own folder."""
+    from common.errors import InputError
+
     try:
         name = json.loads(design.read_text(encoding="utf-8"))["scan"]["name"]
     except (OSError, ValueError, KeyError, TypeError):
@@ -76,11 +125,13 @@ def _why(result: JSON) -> str:
 
 
 def _show(result: JSON, out: Path, *, as_json: bool) -> None:
+    from service.cli.output import print_json
+
     files = {p.relative_to(out).as_posix(): p for p in sorted(out.rglob("*")) if p.is_file()}
     if as_json:
         print_json({"result": result, "files": {name: str(path) for name, path in files.items()}})
         return
-    from service.cli import plantables
+    from service.cli.tables import plan_tables
 
-    plantables.print_plan(result)
+    plan_tables.print_plan(result)
     sys.stdout.write(f"Written: {len(files)} files under {out}, begin with {out / 'plan.html'}\n")

@@ -1,21 +1,55 @@
-"""``rigwright sessions`` and ``rigwright cameras``."""
+"""``rigwright sessions``: looks after sessions."""
 
 from __future__ import annotations
 
 import dataclasses
 import sys
 from pathlib import Path
+from typing import Annotated
 
-from common.errors import InputError
-from rig.acquisition.cameras.registry import discover_all
-from rig.acquisition.session.folder import Session
-from rig.acquisition.session.verify import verify_session
-from service.cli.output import print_json
-from service.cli.running import one_line_errors
+import typer
+
+from service.cli.options import JsonOption
+
+sessions = typer.Typer(name="sessions", help="Look after sessions.", no_args_is_help=True)
+
+
+@sessions.command("verify")
+def sessions_verify(
+    folder: Annotated[
+        Path, typer.Argument(metavar="DIR", help="A session's folder.", show_default=False)
+    ],
+    as_json: JsonOption = False,
+) -> None:
+    """Prove a session whole: every file there, unchanged, and none that nobody knows. Reads only.
+
+    Exit code: 0 whole, 2 it is not, or there is no session.
+
+    Example:  rigwright sessions verify sessions/sub-anna/ses-20261122T093000
+    """
+    run_sessions_verify_command(folder, as_json=as_json)
+
+
+@sessions.command("recover")
+def sessions_recover(
+    folder: Annotated[
+        Path, typer.Argument(metavar="DIR", help="A session's folder.", show_default=False)
+    ],
+) -> None:
+    """Bring in order what a crash left in a session; the next capture into it does that as well.
+
+    Example:  rigwright sessions recover sessions/sub-anna/ses-20261122T093000
+    """
+    run_sessions_recover_command(folder)
 
 
 def run_sessions_verify_command(folder: Path, *, as_json: bool) -> None:
     """Prove a session whole."""
+    from common.errors import InputError
+    from rig.acquisition.session.verify import verify_session
+    from service.cli.output import print_json
+    from service.cli.running import one_line_errors
+
     with one_line_errors():
         check = verify_session(folder)
         document = {**dataclasses.asdict(check), "whole": check.whole}
@@ -38,6 +72,9 @@ def run_sessions_verify_command(folder: Path, *, as_json: bool) -> None:
 
 def run_sessions_recover_command(folder: Path) -> None:
     """Put a session in order."""
+    from rig.acquisition.session.folder import Session
+    from service.cli.running import one_line_errors
+
     with one_line_errors(), Session.open(folder) as session:
         done = session.recovery
         for word, names in (
@@ -49,19 +86,3 @@ def run_sessions_recover_command(folder: Path) -> None:
                 sys.stdout.write(f"{word}: {name}\n")
         if not (done.committed or done.set_aside or done.dropped):
             sys.stdout.write("nothing to do\n")
-
-
-def run_cameras_command(*, as_json: bool) -> None:
-    """List what can be reached."""
-    with one_line_errors():
-        found = discover_all()
-        document = {"cameras": found.cameras, "problems": dict(found.problems)}
-        if as_json:
-            print_json(document)
-            return
-        for camera in found.cameras:
-            sys.stdout.write(f"{camera.backend}: {camera.id}  {camera.vendor} {camera.model}\n")
-        for backend, why in found.problems.items():
-            sys.stdout.write(f"{backend}: {why}\n")
-        if not found.cameras:
-            sys.stdout.write("no camera was found\n")

@@ -1,0 +1,149 @@
+"""``rigwright check``."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from service.cli.options import (
+    CaptureOption,
+    ForceOption,
+    JsonOption,
+    OutOption,
+    PicturesArgument,
+    ReferenceOption,
+    WorkersOption,
+)
+
+
+def check(
+    pictures: PicturesArgument,
+    reference: ReferenceOption,
+    out: OutOption,
+    target_set: Annotated[
+        Path | None,
+        typer.Option(
+            "--targets",
+            metavar="SET.toml",
+            help="The targets in the pictures; those of the calibration without it.",
+            show_default=False,
+        ),
+    ] = None,
+    capture: CaptureOption = None,
+    history: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR",
+            help="Folder of all checks of this rig: this one is added, and a page shows the drift.",
+            show_default=False,
+        ),
+    ] = None,
+    tolerance_mm: Annotated[
+        float, typer.Option(min=0.0, help="Smaller effects at the subject turn no light red.")
+    ] = 0.02,
+    hidden_limit_mm: Annotated[
+        float, typer.Option(min=1e-6, help="A camera that could hide more is not called fine.")
+    ] = 0.1,
+    workers: WorkersOption = None,
+    as_json: JsonOption = False,
+    force: ForceOption = False,
+) -> None:
+    """Check that a rig is still as it was calibrated: which camera moved, and by how much.
+
+    Exit code: 0 fine (green or yellow), 4 the rig must be looked after (red), 2 bad input.
+
+    Example:  rigwright check sessions/today --reference calibration --out check
+    """
+    options = Checking(reference, target_set, history, tolerance_mm, hidden_limit_mm, workers)
+    run_check_command(pictures, capture, out, options, as_json=as_json, force=force)
+
+
+@dataclass(frozen=True)
+class Checking:
+    """What to check against, and what matters."""
+
+    reference: Path
+    targets: Path | None
+    history: Path | None
+    tolerance_mm: float
+    hidden_limit_mm: float
+    workers: int | None
+
+
+def run_check_command(
+    pictures: Path,
+    captures: Sequence[str] | None,
+    out: Path,
+    options: Checking,
+    *,
+    as_json: bool,
+    force: bool,
+) -> None:
+    """Check, write into ``out``, and end with an exit code that scripts can go by."""
+    from service.cli.output import NOT_WELL
+    from service.cli.pictures import asked, given, reference_file, show_measured
+    from service.cli.running import new_folder, one_line_errors, run_task
+
+    with one_line_errors():
+        request, inputs = asked(pictures, captures, options.workers)
+        request |= {
+            "tolerance_mm": options.tolerance_mm,
+            "hidden_limit_mm": options.hidden_limit_mm,
+        }
+        inputs |= {
+            "calibration": reference_file(options.reference),
+            "targets": options.targets or _targets_beside(options.reference),
+            **_earlier(options.history),
+        }
+        with new_folder(out, force=force, spare=given(pictures, inputs)) as folder:
+            result = run_task("service.tasks.calibrating:rig_check", request, inputs, folder)
+        if options.history is not None:
+            _add_to_history(out, options.history, request["made_utc"])
+        show_measured("check", result, out, as_json=as_json)
+    if result["light"] == "red":
+        raise typer.Exit(NOT_WELL)
+
+
+def _targets_beside(reference: Path) -> Path:
+    from common.errors import InputError
+    from service.cli.pictures import TARGETS, reference_file
+
+    beside = reference_file(reference).with_name(TARGETS)
+    if not beside.is_file():
+        raise InputError(
+            "no-targets", f"there is no {TARGETS} beside the calibration", "give --targets"
+        )
+    return beside
+
+
+def _earlier(history: Path | None) -> dict[str, Path]:
+    from common.errors import InputError
+
+    if history is None or not history.exists():
+        return {}
+    if not history.is_dir():
+        raise InputError("history-folder", f"{history} is a file", "give a folder as --history")
+    found = sorted(history.glob("check-*.json"))
+    return {f"check-{number}": path for number, path in enumerate(found)}
+
+
+def _add_to_history(out: Path, history: Path, made_utc: str) -> None:
+    history.mkdir(parents=True, exist_ok=True)
+    stamp = "".join(letter for letter in made_utc if letter.isdigit())[:14]
+    shutil.copyfile(out / "check.json", _free(history, f"check-{stamp}"))
+    page = out / "history.html"
+    if page.exists():
+        shutil.copyfile(page, history / page.name)
+
+
+def _free(folder: Path, stem: str) -> Path:
+    """A name for one more file: checks of one second must not replace one another."""
+    path, number = folder / f"{stem}.json", 2
+    while path.exists():
+        path, number = folder / f"{stem}-{number}.json", number + 1
+    return path

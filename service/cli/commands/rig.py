@@ -1,0 +1,96 @@
+"""``rigwright rig``: looks at a rig that stands."""
+
+from __future__ import annotations
+
+import sys
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from service.cli.options import JsonOption, StationOption
+
+if TYPE_CHECKING:
+    from rig.acquisition.capture.results import SelfTest, SyncCheck
+
+rig = typer.Typer(name="rig", help="Look at a rig that stands.", no_args_is_help=True)
+
+
+@rig.command("check")
+def rig_check(
+    station: StationOption,
+    fire: Annotated[
+        bool, typer.Option("--fire/--no-fire", help="Whether to measure the synchronisation.")
+    ] = True,
+    captures: Annotated[int, typer.Option(min=1, max=100, help="Captures to measure from.")] = 3,
+    write: Annotated[
+        bool, typer.Option("--write", help="Write the delays it finds to the station file.")
+    ] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Look at every device, then fire a few times and tell each camera's lag. Files nothing.
+
+    Exit code: 0 all is well, 2 bad input, 4 something is not.
+
+    Example:  rigwright rig check --station station.toml --write
+    """
+    run_rig_check_command(station, captures if fire else 0, write=write, as_json=as_json)
+
+
+def run_rig_check_command(station: Path, captures: int, *, write: bool, as_json: bool) -> None:
+    """Self-test, then the synchronisation, as far as the devices are well."""
+    from rig.acquisition.capture.rig import open_station
+    from rig.acquisition.station.delays import write_timings
+    from rig.acquisition.station.stationfile import read_station
+    from service.cli.output import NOT_WELL, print_json
+    from service.cli.progress import show_progress, told
+    from service.cli.running import cancel_on_signal, one_line_errors
+    from service.rigs.orders import self_test_document, sync_document
+
+    with one_line_errors(), ExitStack() as stack:
+        rig = stack.enter_context(open_station(read_station(station)))
+        test = rig.self_test()
+        check: SyncCheck | None = None
+        if test.ok and captures:
+            cancel = stack.enter_context(cancel_on_signal())
+            report = told(stack.enter_context(show_progress()))
+            check = rig.sync_check(captures, progress=report, cancel=cancel)
+        stack.close()
+        written = write and check is not None and check.timings is not None
+        if written and check is not None and check.timings is not None:
+            write_timings(station, check.timings)
+        document = {"self_test": self_test_document(test), "written": written}
+        document["sync_check"] = None if check is None else sync_document(check)
+        if as_json:
+            print_json(document)
+        else:
+            _print_checks(test)
+            if check is not None:
+                _print_sync(check, written=written)
+    well = test.ok and (check is None or bool(sync_document(check)["ok"]))
+    if not well:
+        raise typer.Exit(NOT_WELL)
+
+
+def _print_checks(test: SelfTest) -> None:
+    for check in test.checks:
+        sys.stdout.write(f"{'ok ' if check.ok else 'BAD'} {check.name}: {check.text}\n")
+
+
+def _print_sync(check: SyncCheck, *, written: bool) -> None:
+    for number, evidence in enumerate(check.captures, 1):
+        sys.stdout.write(f"capture {number}: {evidence.verdict.text}\n")
+    for fault in check.faults:
+        sys.stdout.write(f"fault: {fault.text}\n")
+    for name, lag in check.lags.items():
+        sys.stdout.write(
+            f"{name}: lag {lag.lag_us / 1e3:.2f} ms +- {lag.uncertainty_us / 1e3:.2f} ms "
+            f"({lag.source})\n"
+        )
+    if check.timings is None:
+        sys.stdout.write(f"no delays: {check.why_not}\n")
+        return
+    for name, timing in check.timings.items():
+        sys.stdout.write(f"{name}: delay {timing.delay_us / 1e3:.2f} ms makes up for it\n")
+    sys.stdout.write("written to the station file\n" if written else "--write keeps these delays\n")

@@ -1,0 +1,74 @@
+"""``rigwright serve``."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def serve(
+    host: Annotated[
+        str | None,
+        typer.Option(help="Address to listen on; 127.0.0.1 without it.", show_default=False),
+    ] = None,
+    port: Annotated[
+        int | None,
+        typer.Option(
+            min=0, max=65535, help="Port; 8000 without it, 0 takes a free one.", show_default=False
+        ),
+    ] = None,
+    data: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR", help="Folder for everything the service keeps.", show_default=False
+        ),
+    ] = None,
+    station: Annotated[
+        list[Path] | None,
+        typer.Option(
+            metavar="STATION.toml",
+            help="A rig to run; may be given several times.",
+            show_default=False,
+        ),
+    ] = None,
+) -> None:
+    """Offer designs, and rigs that stand, over HTTP under /v1. The guide is docs/api.md.
+
+    Example:  rigwright serve --port 8000 --data rigwright-data --station station.toml
+    """
+    run_serve_command(host, port, data, station)
+
+
+def run_serve_command(
+    host: str | None, port: int | None, data: Path | None, stations: list[Path] | None
+) -> None:
+    """Serve until asked to stop."""
+    from service.cli.running import one_line_errors
+    from service.settings import read_settings
+
+    with one_line_errors():
+        settings = read_settings(host=host, port=port, data_dir=data, stations=stations)
+        # After the settings, so that a mistake in them is told at once.
+        from service.api.app import create_app
+        from service.api.context import Service
+        from service.kinds import KINDS
+        from service.server import serve
+
+        service = Service(settings, KINDS)
+        try:
+            serve(service, create_app(service), _say_where)
+        finally:
+            service.close()
+
+
+def _say_where(url: str) -> None:
+    # From here on everything that happens is a line of JSON on standard error.
+    from service.logs import log, set_up_logging
+
+    set_up_logging()
+    log.propagate = True
+    sys.stdout.write(f"Rigwright is at {url}/v1; stop it with Ctrl-C\n")
+    sys.stdout.flush()

@@ -1,0 +1,84 @@
+"""``rigwright targets``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from service.cli.options import ForceOption, JsonOption
+
+JSON = dict[str, Any]
+
+
+def targets(
+    target_set: Annotated[
+        Path | None,
+        typer.Argument(metavar="[SET.toml]", help="Targets to print.", show_default=False),
+    ] = None,
+    design: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DESIGN.json", help="Propose targets for this rig.", show_default=False
+        ),
+    ] = None,
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder to write into.")] = Path(
+        "targets"
+    ),
+    page: Annotated[str, typer.Option(help="A4, A3, letter, or WIDTHxHEIGHT in mm.")] = "A4",
+    as_json: JsonOption = False,
+    force: ForceOption = False,
+) -> None:
+    """Print targets at true size, or propose some for a rig.
+
+    Writes the set (targets.toml), a PDF and an SVG per sheet with a check ruler, and a picture per
+    carrier for the simulated studio. Measure the ruler on the paper and put its length into the
+    set.
+
+    Example:  rigwright targets --design rig/design.json --out targets
+    """
+    run_targets_command(target_set, design, out, page, as_json=as_json, force=force)
+
+
+def run_targets_command(
+    target_set: Path | None,
+    design: Path | None,
+    out: Path,
+    page: str,
+    *,
+    as_json: bool,
+    force: bool,
+) -> None:
+    """Print a set, or propose one for a rig and print that."""
+    from common.errors import InputError
+    from service.cli.running import new_folder, one_line_errors, run_task
+
+    with one_line_errors():
+        given = {"targets": target_set, "design": design}
+        inputs = {role: path for role, path in given.items() if path is not None}
+        if len(inputs) != 1:
+            raise InputError(
+                "targets-which",
+                "give a target set to print, or a design to propose one for",
+                "for example: rigwright targets --design rig/design.json --out targets",
+            )
+        # A set that was printed before is printed anew, with its ruler measured: it is kept.
+        spare = [path for path in inputs.values() if path != out / "targets.toml"]
+        with new_folder(out, force=force, spare=spare) as folder:
+            result = run_task("service.tasks.targeting:targets", {"page": page}, inputs, folder)
+        _show(result, out, as_json=as_json)
+
+
+def _show(result: JSON, out: Path, *, as_json: bool) -> None:
+    from service.cli.output import print_json
+
+    files = {path.name: path for path in sorted(out.iterdir())}
+    if as_json:
+        print_json({"result": result, "files": {name: str(path) for name, path in files.items()}})
+        return
+    from service.cli.tables import measurement_tables
+    from service.cli.tables.design_tables import print_files
+
+    measurement_tables.print_targets(result)
+    print_files(files)

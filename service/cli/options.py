@@ -1,0 +1,83 @@
+"""Options and arguments that several commands have."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+ScanArgument = Annotated[
+    Path,
+    typer.Argument(
+        metavar="SCAN",
+        help="The head: GLB, glTF, OBJ, PLY, STL, 3MF, OFF or XYZ.",
+        show_default=False,
+    ),
+]
+RigOption = Annotated[
+    Path,
+    typer.Option("--rig", metavar="RIG.toml", help="Camera, limits and start.", show_default=False),
+]
+StationOption = Annotated[
+    Path,
+    typer.Option(
+        "--station", metavar="STATION.toml", help="Box, cameras, outputs.", show_default=False
+    ),
+]
+OutOption = Annotated[
+    Path, typer.Option("--out", metavar="DIR", help="Folder to write into.", show_default=False)
+]
+JsonOption = Annotated[
+    bool, typer.Option("--json", help="Print one JSON document instead of tables.")
+]
+ForceOption = Annotated[bool, typer.Option("--force", help="Replace what is in the folder.")]
+WorkersOption = Annotated[
+    int | None,
+    typer.Option(
+        min=1, max=1024, help="Processes to use; one per core without it.", show_default=False
+    ),
+]
+PicturesArgument = Annotated[
+    Path,
+    typer.Argument(
+        metavar="PICTURES",
+        help="A session, or a folder or ZIP archive with a folder per camera "
+        "(cam01/0001.png; one name, one instant).",
+        show_default=False,
+    ),
+]
+CaptureOption = Annotated[
+    list[str] | None,
+    typer.Option("--capture", help="A capture of the session; all without it.", show_default=False),
+]
+TargetsOption = Annotated[
+    Path,
+    typer.Option(
+        "--targets", metavar="SET.toml", help="The targets in the pictures.", show_default=False
+    ),
+]
+ReferenceOption = Annotated[
+    Path,
+    typer.Option(
+        "--reference",
+        metavar="CALIBRATION",
+        help="What `rigwright calibrate` wrote: the folder or its calibration.json.",
+        show_default=False,
+    ),
+]
+
+
+class LensParameter(StrEnum):
+    """The parameters of a lens."""
+
+    f = "f"
+    cx = "cx"
+    cy = "cy"
+    k1 = "k1"
+    k2 = "k2"
+    p1 = "p1"
+    p2 = "p2"
+    k3 = "k3"
+    b1 = "b1"
