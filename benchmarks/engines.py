@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from geometry.arrays import Floats
-from solver.nlp.program import Programme
+from solver.nlp.working_program import WorkingProgram
 
 Watch = Callable[[int, float, float], bool]
 """Called with iteration, objective and violation; returns False to stop."""
@@ -59,7 +59,7 @@ class Outcome:
 
 
 def solve_ipopt(
-    programme: Programme,
+    working: WorkingProgram,
     start: Floats,
     watch: Watch,
     options: dict[str, int | float | str] | None = None,
@@ -67,8 +67,8 @@ def solve_ipopt(
     """Interior point with exact second derivatives (COIN-OR IPOPT, MUMPS inside)."""
     import ipyopt
 
-    low, high = programme.bounds
-    row_low, row_high = programme.row_bounds
+    low, high = working.bounds
+    row_low, row_high = working.row_bounds
     reached = {"iterations": 0, "stopped": False}
 
     def into(function: Callable[..., Floats]) -> Callable[..., None]:
@@ -77,39 +77,39 @@ def solve_ipopt(
 
         return call
 
-    def intermediate(mode: int, iteration: int, cost: float, breach: float, *_: float) -> bool:
+    def intermediate(mode: int, iteration: int, cost: float, violation: float, *_: float) -> bool:
         del mode
         reached["iterations"] = iteration
-        go_on = watch(iteration, cost, breach)
+        go_on = watch(iteration, cost, violation)
         reached["stopped"] = not go_on
         return go_on
 
     problem = ipyopt.Problem(
-        n=programme.size,
+        n=working.size,
         x_l=_wide(low),
         x_u=_wide(high),
-        m=programme.rows,
+        m=working.rows,
         g_l=_wide(row_low),
         g_u=_wide(row_high),
-        sparsity_indices_jac_g=programme.jacobian_pattern,
-        sparsity_indices_h=programme.hessian_pattern,
-        eval_f=programme.objective,
-        eval_grad_f=into(programme.gradient),
-        eval_g=into(programme.values),
-        eval_jac_g=into(programme.jacobian),
-        eval_h=into(programme.hessian),
+        sparsity_indices_jac_g=working.jacobian_pattern,
+        sparsity_indices_h=working.hessian_pattern,
+        eval_f=working.objective,
+        eval_grad_f=into(working.gradient),
+        eval_g=into(working.values),
+        eval_jac_g=into(working.jacobian),
+        eval_h=into(working.hessian),
         intermediate_callback=intermediate,
         ipopt_options=IPOPT_OPTIONS | (options or {}),
     )
     multipliers, below, above = (
-        np.zeros(programme.rows),
-        np.zeros(programme.size),
-        np.zeros(programme.size),
+        np.zeros(working.rows),
+        np.zeros(working.size),
+        np.zeros(working.size),
     )
     inside = np.clip(start, low, high)
     x, _, status = problem.solve(inside, mult_g=multipliers, mult_x_L=below, mult_x_U=above)
     x = np.asarray(x)
-    kkt = kkt_error(programme, x, multipliers, above - below)
+    kkt = kkt_error(working, x, multipliers, above - below)
     why = _WORDS.get(status, f"IPOPT ended with status {status}")
     stopped = bool(reached["stopped"])
     return Outcome(
@@ -133,48 +133,48 @@ class _Stopped(Exception):  # noqa: N818 - a signal, not an error
 
 
 def solve_slsqp(
-    programme: Programme, start: Floats, watch: Watch, max_iterations: int = 500
+    working: WorkingProgram, start: Floats, watch: Watch, max_iterations: int = 500
 ) -> Outcome:
     """Sequential least squares programming with exact first derivatives (SciPy)."""
     from scipy.optimize import Bounds, minimize
 
-    low, high = programme.row_bounds
+    low, high = working.row_bounds
     equal = low == high
     sides = [(np.flatnonzero(equal), low, 1.0)]
     sides += [(np.flatnonzero(~equal & np.isfinite(low)), low, 1.0)]
     sides += [(np.flatnonzero(~equal & np.isfinite(high)), high, -1.0)]
-    row, column = programme.jacobian_pattern
+    row, column = working.jacobian_pattern
 
     def dense(x: Floats) -> Floats:
-        out = np.zeros((programme.rows, programme.size))
-        np.add.at(out, (row, column), programme.jacobian(x))
+        out = np.zeros((working.rows, working.size))
+        np.add.at(out, (row, column), working.jacobian(x))
         return out
 
     constraints = [
         {
             "type": "eq" if k == 0 else "ineq",
-            "fun": lambda x, r=rows, b=bound_, s=sign: s * (programme.values(x)[r] - b[r]),
+            "fun": lambda x, r=rows, b=bound_, s=sign: s * (working.values(x)[r] - b[r]),
             "jac": lambda x, r=rows, s=sign: s * dense(x)[r],
         }
         for k, (rows, bound_, sign) in enumerate(sides)
         if len(rows)
     ]
-    latest = {"x": np.clip(start, *programme.bounds), "iterations": 0}
+    latest = {"x": np.clip(start, *working.bounds), "iterations": 0}
 
     def callback(x: Floats) -> None:
         latest["x"] = np.array(x)
         latest["iterations"] += 1
-        if not watch(int(latest["iterations"]), programme.objective(x), violation(programme, x)):
+        if not watch(int(latest["iterations"]), working.objective(x), violation(working, x)):
             raise _Stopped
 
     try:
         result = minimize(
-            programme.objective,
+            working.objective,
             latest["x"],
-            jac=programme.gradient,
+            jac=working.gradient,
             method="SLSQP",
             callback=callback,
-            bounds=Bounds(*programme.bounds),
+            bounds=Bounds(*working.bounds),
             constraints=constraints,
             options={"maxiter": max_iterations, "ftol": 1e-12},
         )
@@ -186,20 +186,20 @@ def solve_slsqp(
     return Outcome(result.x, np.zeros(0), np.nan, int(result.nit), bool(result.success), False, why)
 
 
-def violation(programme: Programme, variables: Floats) -> float:
+def violation(working: WorkingProgram, variables: Floats) -> float:
     """Largest breach of any row or bound."""
-    values = programme.values(variables)
-    low, high = programme.row_bounds
+    values = working.values(variables)
+    low, high = working.row_bounds
     rows = np.maximum(low - values, values - high).max(initial=0.0)
-    x_low, x_high = programme.bounds
+    x_low, x_high = working.bounds
     return float(max(rows, np.maximum(x_low - variables, variables - x_high).max(initial=0.0), 0.0))
 
 
 def kkt_error(
-    programme: Programme, variables: Floats, multipliers: Floats, bound_multipliers: Floats
+    working: WorkingProgram, variables: Floats, multipliers: Floats, bound_multipliers: Floats
 ) -> float:
     """Largest entry of the gradient of ``f + multipliers . rows + bound_multipliers . x``."""
-    residual = programme.gradient(variables) + bound_multipliers
-    row, column = programme.jacobian_pattern
-    np.add.at(residual, column, programme.jacobian(variables) * multipliers[row])
+    residual = working.gradient(variables) + bound_multipliers
+    row, column = working.jacobian_pattern
+    np.add.at(residual, column, working.jacobian(variables) * multipliers[row])
     return float(np.abs(residual).max(initial=0.0))

@@ -28,12 +28,12 @@ from common.progress import NeverCancelled
 from geometry.head import synthetic_head
 from geometry.preparation import SubjectOptions, prepare_subject
 from rig.specification.examples import example_rig
-from solver.coverage.visibilitycuts import views
+from solver.coverage.views import views
 from solver.information import CovarianceCost
-from solver.nlp.iterate import Task
+from solver.nlp.program import NonlinearProgram
 from solver.nlp.sqp import Outcome, minimise
-from solver.outerloop import all_candidates, covariance_cost, run_start, unknown_bounds
-from solver.problem import Scene
+from solver.outer_loop import candidate_constraints, covariance_cost, run_start, unknown_bounds
+from solver.problem import Problem
 from solver.starts import kmeans_start
 
 CASES = ((9, 1000), (9, 5000), (24, 3000))
@@ -53,40 +53,42 @@ class Timing:
     cost: float
 
 
-def scene_of(cameras: int, points: int) -> Scene:
+def problem_of(cameras: int, points: int) -> Problem:
     """The k-means start of the example rig on the bundled head."""
     spec = example_rig("face")
     options = SubjectOptions(design_count=points, check_count=4000, seed=1)
     subject = prepare_subject(synthetic_head(), options).subject
     names = tuple(f"cam{k:02d}" for k in range(cameras))
-    return Scene(subject, kmeans_start(subject, spec.camera, spec.limits, names, 1), spec.limits)
+    return Problem(subject, kmeans_start(subject, spec.camera, spec.limits, names, 1), spec.limits)
 
 
-def task_of(scene: Scene) -> tuple[Task, np.ndarray]:
+def program_of(problem: Problem) -> tuple[NonlinearProgram, np.ndarray]:
     """The programme of the first round, rays held fixed."""
-    values = scene.start_values()
-    state = scene.unknowns.state(values)
-    seen = views(scene, state)
-    cost = covariance_cost(scene, seen, covariance_cost(scene, seen).typical(state))
-    rows = all_candidates(scene, state, seen)
-    return Task(scene.unknowns, cost, rows, unknown_bounds(scene, values), ("coverage",)), values
+    values = problem.start_values()
+    state = problem.unknowns.state(values)
+    seen = views(problem, state)
+    cost = covariance_cost(problem, seen, covariance_cost(problem, seen).typical(state))
+    rows = candidate_constraints(problem, state, seen)
+    return NonlinearProgram(
+        problem.unknowns, cost, rows, unknown_bounds(problem, values), ("coverage",)
+    ), values
 
 
-def ours(task: Task, values: np.ndarray) -> tuple[Timing, Outcome]:
+def ours(program: NonlinearProgram, values: np.ndarray) -> tuple[Timing, Outcome]:
     """Our solver, to the stop that a round uses."""
     began = time.perf_counter()
-    outcome = minimise(task, values, lambda *_: True, gain_tolerance=GAIN)
+    outcome = minimise(program, values, lambda *_: True, gain_tolerance=GAIN)
     seconds = time.perf_counter() - began
-    return Timing(seconds, task.cost.value(task.unknowns.state(outcome.values))), outcome
+    return Timing(seconds, program.cost.value(program.unknowns.state(outcome.values))), outcome
 
 
-def slsqp_with_differences(task: Task, values: np.ndarray) -> Timing:
+def slsqp_with_differences(program: NonlinearProgram, values: np.ndarray) -> Timing:
     """SLSQP with finite differences on the tightest rows at the start, for a bounded time."""
     from scipy.optimize import minimize
 
-    free = task.unknowns.free
-    state = task.unknowns.state(values)
-    blocks = [r.block.take(r.choose(state, np.zeros(0, np.int64), 0.5)) for r in task.rows]
+    free = program.unknowns.free
+    state = program.unknowns.state(values)
+    blocks = [r.block.take(r.choose(state, np.zeros(0, np.int64), 0.5)) for r in program.rows]
 
     def full(x: np.ndarray) -> np.ndarray:
         out = values.copy()
@@ -94,7 +96,7 @@ def slsqp_with_differences(task: Task, values: np.ndarray) -> Timing:
         return out
 
     def rows(x: np.ndarray) -> np.ndarray:
-        here = task.unknowns.state(full(x))
+        here = program.unknowns.state(full(x))
         parts = []
         for block in blocks:
             value = block.value(here)
@@ -108,7 +110,7 @@ def slsqp_with_differences(task: Task, values: np.ndarray) -> Timing:
     def cost(x: np.ndarray) -> float:
         if time.perf_counter() - began > RIVAL_TIME_S:
             raise late
-        return task.cost.value(task.unknowns.state(full(x)))
+        return program.cost.value(program.unknowns.state(full(x)))
 
     try:
         found = minimize(
@@ -120,7 +122,7 @@ def slsqp_with_differences(task: Task, values: np.ndarray) -> Timing:
     return Timing(time.perf_counter() - began, float(found.fun))
 
 
-def casadi_exact(scene: Scene, task: Task, outcome: Outcome) -> Timing:
+def casadi_exact(problem: Problem, program: NonlinearProgram, outcome: Outcome) -> Timing:
     """CasADi's IPOPT with exact Hessians of the cost, on the rows that bind at our solution.
 
     Those rows are handed over linearised, which is in CasADi's favour: it has no rows to
@@ -128,19 +130,21 @@ def casadi_exact(scene: Scene, task: Task, outcome: Outcome) -> Timing:
     """
     import casadi as ca
 
-    cost = task.cost
+    cost = program.cost
     if not isinstance(cost, CovarianceCost):
         raise TypeError("the oracle knows one cost only")
-    free = task.unknowns.free
+    free = program.unknowns.free
     began = time.perf_counter()
-    x, expression = cost_expression(task.unknowns, cost.points, cost.weight, cost.prior, cost.scale)
+    x, expression = cost_expression(
+        program.unknowns, cost.points, cost.weight, cost.prior, cost.scale
+    )
     chosen = ca.MX.sym("free", len(free))
     base = ca.MX(ca.DM(outcome.values))
     base[free.tolist()] = chosen
     whole = ca.substitute([expression], [x], [base])[0]
-    state = task.unknowns.state(outcome.values)
+    state = program.unknowns.state(outcome.values)
     matrix, offset = [], []
-    for candidates, multipliers in zip(task.rows, outcome.multipliers, strict=True):
+    for candidates, multipliers in zip(program.rows, outcome.multipliers, strict=True):
         bound = np.flatnonzero(multipliers)
         if len(bound) == 0:
             continue
@@ -155,8 +159,8 @@ def casadi_exact(scene: Scene, task: Task, outcome: Outcome) -> Timing:
         {"ipopt.print_level": 0, "print_time": False, "ipopt.sb": "yes",
          "ipopt.max_wall_time": RIVAL_TIME_S, "ipopt.tol": 1e-6},
     )  # fmt: skip
-    start = scene.start_values()[free]
-    low, high = (b[free] for b in task.bounds)
+    start = problem.start_values()[free]
+    low, high = (b[free] for b in program.bounds)
     result = solver(
         x0=start,
         lbg=-ca.inf,
@@ -169,10 +173,10 @@ def casadi_exact(scene: Scene, task: Task, outcome: Outcome) -> Timing:
     return Timing(seconds, float(result["f"]) if done else np.nan)
 
 
-def whole_start(scene: Scene) -> Timing:
+def whole_start(problem: Problem) -> Timing:
     """A start as a design runs it."""
     began = time.perf_counter()
-    result = run_start(scene, lambda *_: None, NeverCancelled())
+    result = run_start(problem, lambda *_: None, NeverCancelled())
     return Timing(time.perf_counter() - began, result.merit.cost)
 
 
@@ -194,18 +198,18 @@ def main() -> None:
         "|---|---|---|---|---|---|---|",
     ]  # fmt: skip
     for cameras, points in CASES:
-        scene = scene_of(cameras, points)
-        task, values = task_of(scene)
-        timings = [ours(task, values) for _ in range(2)]
+        problem = problem_of(cameras, points)
+        program, values = program_of(problem)
+        timings = [ours(program, values) for _ in range(2)]
         timing, outcome = min(timings, key=lambda t: t[0].seconds)
         rivals = ["", ""]
         if chosen.rivals and points <= MOST_POINTS_FOR_RIVALS:
             rivals = [
-                _said(slsqp_with_differences(task, values)),
-                _said(casadi_exact(scene, task, outcome)),
+                _said(slsqp_with_differences(program, values)),
+                _said(casadi_exact(problem, program, outcome)),
             ]
         limit = LIMITS_S.get((cameras, points), "")
-        whole = whole_start(scene)
+        whole = whole_start(problem)
         lines.append(
             f"| {cameras} x {points} | {timing.seconds:.2f} | {limit} | {outcome.iterations} "
             f"| {rivals[0]} | {rivals[1]} | {whole.seconds:.1f} |"

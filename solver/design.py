@@ -13,25 +13,25 @@ from geometry.arrays import Floats
 from geometry.camera import Camera, RigCamera
 from geometry.frames import Pose
 from geometry.subject import Subject
-from solver.coverage.visibilitycuts import judge
+from solver.coverage.views import judge
 from solver.infeasibility import conflicts
 from solver.limits import Limits
-from solver.outerloop import MAX_ROUNDS, StartResult
+from solver.outer_loop import StartResult
 from solver.pool import StartJob, run_all
-from solver.problem import Scene, camera_at
+from solver.problem import Problem, camera_at
 from solver.quality import evaluate
-from solver.refinement import polish
-from solver.result import Concession, Design, Quality, SolverReport, StartReport, Status
+from solver.refinement import refine
+from solver.result import Design, Quality, Relaxation, SolverReport, StartReport, Status
 from solver.starts import kmeans_start, strips
 
 ENGINE = "sequential quadratic programming with exact second derivatives (PIQP)"
-_EXPECTED_ROUNDS = 8
-_POLISH_COST = 1.01
-_POLISH_TRIES = 3
+_EXPECTED_OUTER_ITERATIONS = 8
+_REFINEMENT_COST = 1.01
+_REFINEMENT_TRIES = 3
 
 
 @dataclass(frozen=True, eq=False)
-class Order:
+class Request:
     """What is to be designed. See :func:`design` for the fields."""
 
     subject: Subject
@@ -91,11 +91,11 @@ class Order:
             return None
         return (*(c.pose for c in self.fixed), *self.start)
 
-    def scene(self, cameras: tuple[RigCamera, ...]) -> Scene:
+    def problem(self, cameras: tuple[RigCamera, ...]) -> Problem:
         """The problem that starts from these cameras."""
         everyone = (*self.fixed, *cameras)
         anchor = self.anchor or tuple(c.pose for c in everyone)
-        return Scene(self.subject, everyone, self.limits, anchor)
+        return Problem(self.subject, everyone, self.limits, anchor)
 
 
 def design(
@@ -121,27 +121,29 @@ def design(
     ``infeasible`` and the conflicts named. Raises :class:`InputError` for orders that cannot be
     understood and :class:`CancelledError` within a second of ``cancel`` being set.
     """
-    order = Order(subject, camera, limits, count, seed, starts, fixed, start)
+    request = Request(subject, camera, limits, count, seed, starts, fixed, start)
     token = cancel or NeverCancelled()
     began = time.monotonic()
     tell = _Teller(progress, starts)
     tell.stage("start", 0.0)
-    jobs = _jobs(order, token)
+    jobs = _jobs(request, token)
     results = run_all(jobs, workers, tell.step, token)
     tell.stage("choose", 0.9)
     scores = []
     for job, result in zip(jobs, results, strict=True):
         if token.is_set():
             raise CancelledError
-        scores.append(evaluate(subject, job.scene.placed(result.values), limits, job.scene.anchor))
+        scores.append(
+            evaluate(subject, job.problem.placed(result.values), limits, job.problem.anchor)
+        )
     best = min(range(len(jobs)), key=lambda k: (*_rank(scores[k]), k))
-    scene = jobs[best].scene
-    tell.stage("polish", 0.93)
-    values, quality, kkt, why, iterations = _finish(scene, results[best], scores[best], token)
-    found: tuple[Concession, ...] = ()
+    problem = jobs[best].problem
+    tell.stage("refine", 0.93)
+    values, quality, kkt, why, iterations = _finish(problem, results[best], scores[best], token)
+    found: tuple[Relaxation, ...] = ()
     if not quality.feasible:
         tell.stage("diagnose", 0.96)
-        found = conflicts(scene, values, token)
+        found = conflicts(problem, values, token)
     if token.is_set():
         raise CancelledError
     report = SolverReport(
@@ -156,9 +158,9 @@ def design(
         starts=tuple(_start_report(j, r, s) for j, r, s in zip(jobs, results, scores, strict=True)),
         conflicts=found,
     )
-    begin = evaluate(subject, scene.cameras, limits, scene.anchor)
+    begin = evaluate(subject, problem.cameras, limits, problem.anchor)
     tell.stage("done", 1.0)
-    return Design(scene.placed(values), quality, scene.cameras, begin, limits, report)
+    return Design(problem.placed(values), quality, problem.cameras, begin, limits, report)
 
 
 class _Teller:
@@ -173,43 +175,43 @@ class _Teller:
         self._fraction = max(self._fraction, fraction)
         self._progress(Progress(name, self._fraction))
 
-    def step(self, start: int, round_: int, iteration: int, cost: float, breach: float) -> None:
-        # Rounds are not known in advance; a start creeps towards its end without passing it.
-        share = 1.0 - np.exp(-2.0 * (round_ + iteration / 1e3) / min(_EXPECTED_ROUNDS, MAX_ROUNDS))
+    def step(self, start: int, outer: int, iteration: int, cost: float, violation: float) -> None:
+        # How many there will be is not known; a start creeps towards its end without passing it.
+        share = 1.0 - np.exp(-2.0 * (outer + iteration / 1e3) / _EXPECTED_OUTER_ITERATIONS)
         self._done[start] = max(self._done[start], float(share))
         self._fraction = max(self._fraction, 0.9 * sum(self._done) / len(self._done))
-        self._progress(Progress("solve", self._fraction, start, iteration, cost, breach))
+        self._progress(Progress("solve", self._fraction, start, iteration, cost, violation))
 
 
-def _jobs(order: Order, cancel: CancelToken) -> list[StartJob]:
+def _jobs(request: Request, cancel: CancelToken) -> list[StartJob]:
     """The given or the k-means start, the best strip, then jittered k-means starts."""
-    subject, camera, limits, names = order.subject, order.camera, order.limits, order.names
+    subject, camera, limits, names = request.subject, request.camera, request.limits, request.names
     jobs: list[StartJob] = []
 
     def add(kind: str, cameras: tuple[RigCamera, ...]) -> None:
         if cancel.is_set():
             raise CancelledError
-        jobs.append(StartJob(len(jobs), kind, order.scene(cameras), order.seed))
+        jobs.append(StartJob(len(jobs), kind, request.problem(cameras), request.seed))
 
-    if order.start is not None:
+    if request.start is not None:
         add(
             "given",
             tuple(
                 camera_at(camera, n, p, _target(subject))
-                for n, p in zip(names, order.start, strict=True)
+                for n, p in zip(names, request.start, strict=True)
             ),
         )
-        while len(jobs) < order.starts:
-            add("given, jittered", _jittered(order, len(jobs)))
+        while len(jobs) < request.starts:
+            add("given, jittered", _jittered(request, len(jobs)))
         return jobs
-    add("k-means", kmeans_start(subject, camera, limits, names, order.seed))
-    if order.starts > 1 and len(names) > 1:
+    add("k-means", kmeans_start(subject, camera, limits, names, request.seed))
+    if request.starts > 1 and len(names) > 1:
         add("strip", best_strip(subject, camera, limits, names))
-    while len(jobs) < order.starts:
+    while len(jobs) < request.starts:
         index = len(jobs)
         add(
             "k-means, jittered",
-            kmeans_start(subject, camera, limits, names, order.seed + 1000 * index, 1.0),
+            kmeans_start(subject, camera, limits, names, request.seed + 1000 * index, 1.0),
         )
     return jobs
 
@@ -218,20 +220,20 @@ def _target(subject: Subject) -> Floats:
     return subject.design_points.centroid_mm
 
 
-def _jittered(order: Order, index: int) -> tuple[RigCamera, ...]:
+def _jittered(request: Request, index: int) -> tuple[RigCamera, ...]:
     """The given poses, each turned by about 6 degrees and moved by 10 % of its distance."""
-    rng = np.random.default_rng([order.seed, index])
+    rng = np.random.default_rng([request.seed, index])
     out = []
-    for name, pose in zip(order.names, order.start or (), strict=True):
-        distance = float(np.linalg.norm(pose.position_rig_mm - _target(order.subject)))
+    for name, pose in zip(request.names, request.start or (), strict=True):
+        distance = float(np.linalg.norm(pose.position_rig_mm - _target(request.subject)))
         position = pose.position_rig_mm + 0.1 * distance * rng.normal(size=3)
         angles = pose.omega_phi_kappa_deg + 6.0 * rng.normal(size=3)
         out.append(
             camera_at(
-                order.camera,
+                request.camera,
                 name,
                 Pose.from_omega_phi_kappa(position, angles),
-                _target(order.subject),
+                _target(request.subject),
             )
         )
     return tuple(out)
@@ -246,29 +248,31 @@ def best_strip(
 
 
 def _rank(quality: Quality) -> tuple[float, float]:
-    """Feasible before infeasible by relative breach, then by cost."""
-    breach = sum(max(0.0, -r.slack) / max(abs(r.limit), 1e-3) for r in quality.violated)
-    return breach, quality.cost_mm2
+    """Feasible before infeasible by relative violation, then by cost."""
+    violation = sum(max(0.0, -r.slack) / max(abs(r.limit), 1e-3) for r in quality.violated)
+    return violation, quality.cost_mm2
 
 
 def _finish(
-    scene: Scene, result: StartResult, quality: Quality, cancel: CancelToken
+    problem: Problem, result: StartResult, quality: Quality, cancel: CancelToken
 ) -> tuple[Floats, Quality, float, str, int]:
     """Bring the winner to the last digit, unless that would cost it a limit.
 
-    A polish that loses a point is repeated with that point promised by name.
+    A refinement that loses a point is repeated with that point named for more views.
     """
-    for _ in range(_POLISH_TRIES):
-        outcome = polish(scene, result, cancel)
-        polished = evaluate(scene.subject, scene.placed(outcome.values), scene.limits, scene.anchor)
-        # A sharper optimum of the promised rays may cost a hair with the rays as they are.
-        worth = polished.feasible and polished.cost_mm2 <= _POLISH_COST * quality.cost_mm2
-        if worth or _rank(polished) < _rank(quality):
-            return outcome.values, polished, outcome.kkt_error, outcome.why, outcome.iterations
-        judged = judge(scene, scene.unknowns.state(outcome.values))
+    for _ in range(_REFINEMENT_TRIES):
+        outcome = refine(problem, result, cancel)
+        refined = evaluate(
+            problem.subject, problem.placed(outcome.values), problem.limits, problem.anchor
+        )
+        # A sharper optimum of the assigned rays may cost a hair with the rays as they are.
+        worth = refined.feasible and refined.cost_mm2 <= _REFINEMENT_COST * quality.cost_mm2
+        if worth or _rank(refined) < _rank(quality):
+            return outcome.values, refined, outcome.kkt_error, outcome.why, outcome.iterations
+        judged = judge(problem, problem.unknowns.state(outcome.values))
         result = replace(
             result,
-            promised=np.union1d(result.promised, judged.missed),
+            added_points=np.union1d(result.added_points, judged.missed),
             margins=result.margins.wider(judged.shortfall),
         )
     return result.values, quality, result.outcome.kkt_error, result.why, 0

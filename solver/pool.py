@@ -18,8 +18,8 @@ from threadpoolctl import threadpool_limits
 
 from common.errors import CancelledError
 from common.progress import CancelToken
-from solver.outerloop import Report, StartResult, run_start
-from solver.problem import Scene
+from solver.outer_loop import Report, StartResult, run_start
+from solver.problem import Problem
 
 _BLAS_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 _POLL_S = 0.05
@@ -31,7 +31,7 @@ class StartJob:
 
     index: int
     kind: str
-    scene: Scene
+    problem: Problem
     seed: int
 
 
@@ -72,7 +72,7 @@ def _die_with(parent: BaseProcess) -> None:
 def solve(job: StartJob, report: Report, cancel: CancelToken) -> StartResult:
     """Run one start on one BLAS thread, so that it gives the same bits wherever it runs."""
     with threadpool_limits(1):
-        return run_start(job.scene, report, cancel, job.seed)
+        return run_start(job.problem, report, cancel, job.seed)
 
 
 def _solve_in_worker(job: StartJob) -> StartResult:
@@ -80,8 +80,8 @@ def _solve_in_worker(job: StartJob) -> StartResult:
         raise RuntimeError("the worker was not set up")
     messages, cancelled = _channel
 
-    def report(round_: int, iteration: int, cost: float, breach: float) -> None:
-        messages.put((job.index, round_, iteration, cost, breach))
+    def report(outer: int, iteration: int, cost: float, violation: float) -> None:
+        messages.put((job.index, outer, iteration, cost, violation))
 
     return solve(job, report, cancelled)
 
@@ -90,7 +90,7 @@ class Listener(Protocol):
     """Receives ``(start, round, iteration, cost, violation)`` of all starts."""
 
     def __call__(
-        self, start: int, round_: int, iteration: int, cost: float, breach: float, /
+        self, start: int, outer: int, iteration: int, cost: float, violation: float, /
     ) -> None:
         """Take note."""
 

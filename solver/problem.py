@@ -12,14 +12,14 @@ from geometry.arrays import Bools, Floats
 from geometry.camera import Camera, RigCamera
 from geometry.frames import PHOTO_TO_CV, Pose
 from geometry.subject import Subject
-from solver.constraints.spherecover import sphere_cover
 from solver.limits import Limits
 from solver.motion import HeadPosition, framing_positions, visibility_positions
+from solver.sphere_cover import sphere_cover
 from solver.variables import FOCUS, PER_CAMERA, Unknowns
 
 
 @dataclass(frozen=True, eq=False)
-class Scene:
+class Problem:
     """Subject, cameras at their start, and limits.
 
     ``anchor`` are the poses about which Eq 8 bounds the cameras, where these are not the start.
@@ -27,7 +27,7 @@ class Scene:
     Positions are divided by :attr:`length_mm`, the mean stand-off of the start, about
     :attr:`origin_mm`, the centroid of the design points. ``object_points`` is the number of
     leading design points that stand for the object where a limit speaks of its mean; those
-    after them were added to be promised views.
+    after them were added to be assigned views.
     """
 
     subject: Subject

@@ -13,17 +13,17 @@ from geometry.frames import Pose
 from geometry.optics import blur_disk_mm, depth_of_field_mm, ground_sample_distance_mm
 from geometry.subject import Subject
 from solver.constraints.table import constraint_table
-from solver.coverage.visibility import sight
-from solver.coverage.visibilitycuts import in_frame
+from solver.coverage.views import in_frame
+from solver.coverage.visibility import cast_rays
 from solver.information import normal_matrices
 from solver.limits import Limits
 from solver.motion import HeadPosition
-from solver.problem import Scene
+from solver.problem import Problem
 from solver.result import CameraTable, CoverageShare, PointTable, Quality
 
 
 @dataclass(frozen=True, eq=False)
-class Sightings:
+class Observations:
     """What the cameras see of the check points in one head position, each (n, q).
 
     ``visible``: facing with a free line of sight; ``framed``: visible and in frame; ``sharp``:
@@ -37,14 +37,16 @@ class Sightings:
     depth_mm: Floats
 
     @classmethod
-    def of(cls, scene: Scene, position: HeadPosition) -> Sightings:
+    def of(cls, problem: Problem, position: HeadPosition) -> Observations:
         """Cast all rays with the head in one position."""
-        source, occluder = scene.subject.check_points, scene.subject.occluder
-        centres = np.stack([c.pose.position_rig_mm for c in scene.cameras])
-        found = sight(source, occluder, centres, scene.limits.incidence.ray_max_deg, (position,))
+        source, occluder = problem.subject.check_points, problem.subject.occluder
+        centres = np.stack([c.pose.position_rig_mm for c in problem.cameras])
+        found = cast_rays(
+            source, occluder, centres, problem.limits.incidence.ray_max_deg, (position,)
+        )
         points = position.points(source.points_mm)
         framed, sharp, depth = found.seen.copy(), found.seen.copy(), np.empty(found.seen.shape)
-        for i, camera in enumerate(scene.cameras):
+        for i, camera in enumerate(problem.cameras):
             depth[i] = camera.pose.to_camera(points)[:, 2]
             framed[i] &= in_frame(camera, points)
             sharp[i] = framed[i] & is_sharp(camera, depth[i])
@@ -80,13 +82,13 @@ def evaluate(
         raise InputError(
             "camera-names", "two cameras have the same name", "give every camera its own name"
         )
-    scene = Scene(subject, cameras, limits, anchor)
-    found = [Sightings.of(scene, position) for position in scene.visibility_positions]
+    problem = Problem(subject, cameras, limits, anchor)
+    found = [Observations.of(problem, position) for position in problem.visibility_positions]
     rest = found[0]
-    points = _points(scene, rest)
+    points = _points(problem, rest)
     norms = np.linalg.norm(points.covariance_mm2, axis=(1, 2))
     seen = int(rest.visible.sum())
-    coverage = _coverage(scene, found)
+    coverage = _coverage(problem, found)
     return Quality(
         cost_mm2=float(norms.mean()),
         sigma_median_mm=float(np.median(points.sigma_mm)),
@@ -97,28 +99,28 @@ def evaluate(
         in_frame_share=float(rest.framed.sum() / max(1, seen)),
         base_height=base_height_table(cameras, subject.design_points.centroid_mm),
         convergence_deg=convergence_table(cameras, subject.design_points.centroid_mm),
-        cameras=_cameras(scene, rest),
+        cameras=_cameras(problem, rest),
         points=points,
-        constraints=constraint_table(scene, [f.visible for f in found], coverage),
+        constraints=constraint_table(problem, [f.visible for f in found], coverage),
     )
 
 
-def _coverage(scene: Scene, found: list[Sightings]) -> tuple[CoverageShare, ...]:
+def _coverage(problem: Problem, found: list[Observations]) -> tuple[CoverageShare, ...]:
     """Shares of points in so many views or more, at the worst head position."""
     counts = [f.framed.sum(axis=0) for f in found]
-    most = max([3, *(t.views for t in scene.limits.coverage.tiers)])
+    most = max([3, *(t.views for t in problem.limits.coverage.tiers)])
     return tuple(
         CoverageShare(v, min(float((c >= v).mean()) for c in counts))
-        for v in range(1, min(most, scene.count) + 1)
+        for v in range(1, min(most, problem.count) + 1)
     )
 
 
-def _points(scene: Scene, rest: Sightings) -> PointTable:
-    source = scene.subject.check_points
-    weight = rest.framed * scene.ray_weight[:, None]
-    state = scene.unknowns.state(scene.start_values())
-    normal = normal_matrices(state, scene.scaled(source.points_mm), weight, scene.prior)
-    covariance = np.asarray(np.linalg.inv(normal) * scene.length_mm**2, dtype=np.float64)
+def _points(problem: Problem, rest: Observations) -> PointTable:
+    source = problem.subject.check_points
+    weight = rest.framed * problem.ray_weight[:, None]
+    state = problem.unknowns.state(problem.start_values())
+    normal = normal_matrices(state, problem.scaled(source.points_mm), weight, problem.prior)
+    covariance = np.asarray(np.linalg.inv(normal) * problem.length_mm**2, dtype=np.float64)
     longest = np.linalg.eigvalsh(covariance)[:, -1]
     views, sharp = rest.framed.sum(axis=0), rest.sharp.sum(axis=0)
     return PointTable(source, covariance, np.sqrt(longest), views, sharp)
@@ -141,15 +143,15 @@ def convergence_table(cameras: tuple[RigCamera, ...], centroid_mm: Floats) -> Fl
     return np.asarray(angles)
 
 
-def _cameras(scene: Scene, rest: Sightings) -> CameraTable:
-    n = scene.count
+def _cameras(problem: Problem, rest: Observations) -> CameraTable:
+    n = problem.count
     gsd, incidence, depth = (
         np.full((n, 3), np.nan),
         np.full((n, 2), np.nan),
         np.full((n, 2), np.nan),
     )
     focus = np.empty((n, 2))
-    for i, c in enumerate(scene.cameras):
+    for i, c in enumerate(problem.cameras):
         kind = c.camera
         focus[i] = depth_of_field_mm(
             c.focus_distance_mm, kind.focal_length_mm, kind.f_number, kind.circle_of_confusion_mm
@@ -163,22 +165,22 @@ def _cameras(scene: Scene, rest: Sightings) -> CameraTable:
         gsd[i] = pixel.min(), pixel.mean(), pixel.max()
         incidence[i] = angle.mean(), angle.max()
         depth[i] = z.min(), z.max()
-    centres = np.stack([c.pose.position_rig_mm for c in scene.cameras])
-    distance = np.linalg.norm(centres - scene.origin_mm, axis=1)
+    centres = np.stack([c.pose.position_rig_mm for c in problem.cameras])
+    distance = np.linalg.norm(centres - problem.origin_mm, axis=1)
     return CameraTable(
-        rest.framed.sum(axis=1), gsd, incidence, depth, focus, distance, nearest_body_mm(scene)
+        rest.framed.sum(axis=1), gsd, incidence, depth, focus, distance, nearest_body_mm(problem)
     )
 
 
-def nearest_body_mm(scene: Scene) -> Floats:
+def nearest_body_mm(problem: Problem) -> Floats:
     """Clearance (n,) of each body's sphere cover to the nearest other one, infinite if alone."""
     centres = [
-        c.pose.to_rig(o * scene.length_mm)
-        for c, (o, _) in zip(scene.cameras, scene.spheres, strict=True)
+        c.pose.to_rig(o * problem.length_mm)
+        for c, (o, _) in zip(problem.cameras, problem.spheres, strict=True)
     ]
-    radii = [r * scene.length_mm for _, r in scene.spheres]
-    out = np.full(scene.count, np.inf)
-    for i in range(scene.count):
+    radii = [r * problem.length_mm for _, r in problem.spheres]
+    out = np.full(problem.count, np.inf)
+    for i in range(problem.count):
         for k in range(i):
             gap = np.linalg.norm(centres[i][:, None] - centres[k][None], axis=2)
             least = float((gap - radii[i][:, None] - radii[k][None]).min())

@@ -5,39 +5,38 @@ from __future__ import annotations
 from threadpoolctl import threadpool_limits
 
 from common.progress import CancelToken
-from solver.coverage.visibilitycuts import (
-    Cuts,
-    cuts_for_hidden,
-    opening_directions,
-    views,
-    with_points,
-)
-from solver.nlp.iterate import Task
+from solver.constraints.builders.coverage import cut_constraints
+from solver.coverage.cuts import VisibilityCuts, cuts_for_hidden, opening_directions
+from solver.coverage.views import views, with_points
+from solver.formulation import COVERAGE, candidate_constraints, covariance_cost, unknown_bounds
+from solver.nlp.program import NonlinearProgram
 from solver.nlp.sqp import Outcome, minimise
-from solver.outerloop import StartResult, all_candidates, covariance_cost, unknown_bounds
-from solver.problem import Scene
+from solver.outer_loop import StartResult
+from solver.problem import Problem
 
 _RADIUS = 0.02
 _MAX_STEPS = 120
 _TIGHT = 1e-6
 
 
-def polish(scene: Scene, result: StartResult, cancel: CancelToken) -> Outcome:
-    """Solve to the optimality conditions from where a start ended, with the same promises."""
+def refine(problem: Problem, result: StartResult, cancel: CancelToken) -> Outcome:
+    """Solve to the optimality conditions from where a start ended, with the same assignment."""
     with threadpool_limits(1):
-        scene, values = with_points(scene, result.promised), result.values
-        state = scene.unknowns.state(values)
-        seen = views(scene, state, None, result.margins)
-        opening = opening_directions(scene, state, seen.promises)
-        cost = covariance_cost(scene, seen, covariance_cost(scene, seen).typical(state))
-        rows = all_candidates(scene, state, seen)
-        bounds = unknown_bounds(scene, scene.anchor_values())
-        cuts = Cuts.none()
+        problem, values = with_points(problem, result.added_points), result.values
+        state = problem.unknowns.state(values)
+        seen = views(problem, state, None, result.margins)
+        opening = opening_directions(problem, state, seen.assigned)
+        cost = covariance_cost(problem, seen, covariance_cost(problem, seen).typical(state))
+        rows = candidate_constraints(problem, state, seen)
+        bounds = unknown_bounds(problem, problem.anchor_values())
+        cuts = VisibilityCuts.none()
         found, known = values, None
         for _ in range(3):
-            task = Task(scene.unknowns, cost, rows + cuts.rows(scene), bounds, ("coverage",))
+            program = NonlinearProgram(
+                problem.unknowns, cost, rows + cut_constraints(problem, cuts), bounds, COVERAGE
+            )
             outcome = minimise(
-                task,
+                program,
                 found,
                 lambda *_: not cancel.is_set(),
                 tolerance=_TIGHT,
@@ -47,7 +46,7 @@ def polish(scene: Scene, result: StartResult, cancel: CancelToken) -> Outcome:
                 radius=_RADIUS,
             )
             found, known = outcome.values, outcome.multipliers
-            lost = cuts_for_hidden(scene, scene.unknowns.state(found), seen.promises, opening)
+            lost = cuts_for_hidden(problem, problem.unknowns.state(found), seen.assigned, opening)
             if outcome.stopped or len(lost.camera) == 0:
                 break
             cuts = cuts.joined(lost)

@@ -134,7 +134,7 @@ class Status(StrEnum):
 
 @dataclass(frozen=True)
 class StartReport:
-    """How one start went. ``violation`` is the largest scaled breach of any limit."""
+    """How one start went. ``violation`` is the largest scaled violation of any limit."""
 
     index: int
     kind: str
@@ -147,7 +147,7 @@ class StartReport:
 
 
 @dataclass(frozen=True)
-class Concession:
+class Relaxation:
     """A limit that takes part in a contradiction.
 
     ``give_mm`` etc. would be ambiguous, so ``give`` is in ``unit``: by how much the limit has to
@@ -157,8 +157,8 @@ class Concession:
 
     family: str
     unit: str
-    give: float
-    give_alone: float | None
+    amount: float
+    amount_alone: float | None
 
 
 @dataclass(frozen=True)
@@ -174,7 +174,7 @@ class SolverReport:
     seed: int
     seconds: float
     starts: tuple[StartReport, ...]
-    conflicts: tuple[Concession, ...] = ()
+    conflicts: tuple[Relaxation, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -122,8 +122,8 @@ def kmeans_start(
     rng = np.random.default_rng(seed)
     out = []
     for name, (centre, normal) in zip(names, _clusters(points, len(names), seed), strict=True):
-        turn = Rotation.from_rotvec(np.radians(jitter * _JITTER_DEG) * rng.normal(size=3))
-        outward = turn.apply(normal)
+        rotation = Rotation.from_rotvec(np.radians(jitter * _JITTER_DEG) * rng.normal(size=3))
+        outward = rotation.apply(normal)
         roll = better_roll(camera, limits, points.points_mm, -outward)
         distance = fitting_distance(camera, limits, points.points_mm, -outward, roll)
         distance *= 1.0 + abs(jitter * _JITTER_DISTANCE * rng.normal())

@@ -18,7 +18,7 @@ from geometry.frames import PHOTO_TO_CV, Pose
 
 PER_CAMERA = 7
 ANGLES = slice(0, 3)
-PLACE = slice(3, 6)
+POSITION = slice(3, 6)
 FOCUS = 6
 
 
@@ -86,7 +86,7 @@ class Unknowns:
             values[k, 0] = np.arctan2(-relative[2, 1], relative[2, 2])
             values[k, 1] = phi
             values[k, 2] = np.arctan2(-relative[1, 0], relative[0, 0])
-            values[k, PLACE] = (pose.position_rig_mm - self.origin_mm) / self.length_mm
+            values[k, POSITION] = (pose.position_rig_mm - self.origin_mm) / self.length_mm
         values[:, FOCUS] = np.asarray(focus_mm) / self.length_mm
         return values.ravel()
 
@@ -117,4 +117,4 @@ class Unknowns:
             for b in range(a, 3):
                 second[:, a, b] = second[:, b, a] = product(once[a] + once[b])
         rotation = product(np.zeros(3, dtype=np.int64))
-        return NetworkState(rotation, first, second, table[:, PLACE], table[:, FOCUS])
+        return NetworkState(rotation, first, second, table[:, POSITION], table[:, FOCUS])

@@ -126,8 +126,10 @@ def solver_figures(report: SolverReport) -> dict[str, Any]:
             {
                 "family": conflict.family,
                 "unit": conflict.unit,
-                "give": number(conflict.give),
-                "give_alone": None if conflict.give_alone is None else number(conflict.give_alone),
+                "give": number(conflict.amount),
+                "give_alone": None
+                if conflict.amount_alone is None
+                else number(conflict.amount_alone),
             }
             for conflict in report.conflicts
         ],

@@ -215,11 +215,11 @@ def conflict_table(solver: SolverReport) -> str:
         unit = f" {esc(conflict.unit)}" if conflict.unit else ""
         alone = (
             "is not enough"
-            if conflict.give_alone is None
-            else figure_text(conflict.give_alone) + unit
+            if conflict.amount_alone is None
+            else figure_text(conflict.amount_alone) + unit
         )
         rows.append(
-            (element("span", esc(title), title=words), figure_text(conflict.give) + unit, alone)
+            (element("span", esc(title), title=words), figure_text(conflict.amount) + unit, alone)
         )
     return table(
         ("Limit", "Gives way in the nearest design by", "It alone would have to by"),

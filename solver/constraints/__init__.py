@@ -1,4 +1,4 @@
-"""Limits as rows of a nonlinear programme, one family of geometry per file.
+"""Limits as rows of a nonlinear program, one family of geometry per file.
 
 Every row knows its value, its derivative by the unknowns it touches and how to add its
 curvature to a Hessian. Lengths are in units of the length scale of

@@ -13,7 +13,7 @@ import numpy as np
 
 from geometry.arrays import Floats, Ints
 from solver.constraints.base import Block, camera_columns, scatter
-from solver.variables import ANGLES, PLACE, NetworkState
+from solver.variables import ANGLES, POSITION, NetworkState
 
 
 def carried(state: NetworkState, camera: Ints, offset: Floats) -> Floats:
@@ -26,7 +26,7 @@ def _carried_1(state: NetworkState, camera: Ints, offset: Floats) -> Floats:
     """Derivatives (m, 3, 6) of :func:`carried` by the camera's pose."""
     out = np.empty((len(camera), 3, 6))
     out[:, :, ANGLES] = np.einsum("rakm,rk->rma", state.rotation_1[camera], offset)
-    out[:, :, PLACE] = np.eye(3)
+    out[:, :, POSITION] = np.eye(3)
     return out
 
 
@@ -144,7 +144,7 @@ class BodyPairs(Block):
 
 
 @dataclass(frozen=True, eq=False)
-class SightPlanes(Block):
+class ViewPlanes(Block):
     """``normal . R (u - C)``: a neighbour's sphere against a side of a camera's view.
 
     ``camera`` (m,) looks, ``other`` (m,) carries the sphere at ``offset`` (m, 3); ``normal``

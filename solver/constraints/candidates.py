@@ -15,7 +15,7 @@ VIOLATED = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
-class Candidates:
+class CandidateConstraints:
     """A block whose rows compete in groups; the tightest ``keep`` of each are worked on.
 
     ``group`` (rows,) names the group of each row, for example its camera and side of the frame.
@@ -26,7 +26,7 @@ class Candidates:
     keep: int
 
     @classmethod
-    def all_of(cls, block: Block) -> Candidates:
+    def all_of(cls, block: Block) -> CandidateConstraints:
         """A block of which every row is always worked on."""
         return cls(block, np.zeros(block.rows, dtype=np.int64), block.rows)
 

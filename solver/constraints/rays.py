@@ -8,7 +8,7 @@ import numpy as np
 
 from geometry.arrays import Floats, Ints
 from solver.constraints.base import Block, camera_columns, scatter
-from solver.variables import ANGLES, FOCUS, PER_CAMERA, PLACE, NetworkState
+from solver.variables import ANGLES, FOCUS, PER_CAMERA, POSITION, NetworkState
 
 
 def _by_camera(cameras: Ints) -> list[tuple[int, Ints]]:
@@ -43,16 +43,16 @@ class RayPlanes(Block):
         return camera_columns(self.camera, 6)
 
     def value(self, state: NetworkState) -> Floats:
-        arm = self.point - state.centre[self.camera]
+        offset = self.point - state.centre[self.camera]
         world = np.einsum("rk,rkm->rm", self.normal, state.rotation[self.camera])
-        return np.asarray(np.einsum("rm,rm->r", world, arm))
+        return np.asarray(np.einsum("rm,rm->r", world, offset))
 
     def jacobian(self, state: NetworkState) -> Floats:
-        arm = self.point - state.centre[self.camera]
+        offset = self.point - state.centre[self.camera]
         out = np.empty((self.rows, 6))
         turned = np.einsum("rk,rakm->ram", self.normal, state.rotation_1[self.camera])
-        out[:, ANGLES] = np.einsum("ram,rm->ra", turned, arm)
-        out[:, PLACE] = -np.einsum("rk,rkm->rm", self.normal, state.rotation[self.camera])
+        out[:, ANGLES] = np.einsum("ram,rm->ra", turned, offset)
+        out[:, POSITION] = -np.einsum("rk,rkm->rm", self.normal, state.rotation[self.camera])
         return out
 
     def add_hessian(self, state: NetworkState, multipliers: Floats, out: Floats) -> None:
@@ -82,8 +82,8 @@ class FocusRays(Block):
         return camera_columns(self.camera, 7)
 
     def _depth(self, state: NetworkState) -> Floats:
-        arm = self.point - state.centre[self.camera]
-        return np.asarray(np.einsum("rm,rm->r", state.axis[self.camera], arm))
+        offset = self.point - state.centre[self.camera]
+        return np.asarray(np.einsum("rm,rm->r", state.axis[self.camera], offset))
 
     def value(self, state: NetworkState) -> Floats:
         z, s = self._depth(state), state.focus[self.camera]
@@ -92,26 +92,26 @@ class FocusRays(Block):
     def jacobian(self, state: NetworkState) -> Floats:
         z, s = self._depth(state), state.focus[self.camera]
         by_depth = (self.side - self.blur * (s - self.focal))[:, None]
-        arm = self.point - state.centre[self.camera]
+        offset = self.point - state.centre[self.camera]
         out = np.empty((self.rows, 7))
         slope = state.rotation_1[self.camera][:, :, 2, :]
-        out[:, ANGLES] = by_depth * np.einsum("ram,rm->ra", slope, arm)
-        out[:, PLACE] = -by_depth * state.axis[self.camera]
+        out[:, ANGLES] = by_depth * np.einsum("ram,rm->ra", slope, offset)
+        out[:, POSITION] = -by_depth * state.axis[self.camera]
         out[:, FOCUS] = -self.side - self.blur * z
         return out
 
     def add_hessian(self, state: NetworkState, multipliers: Floats, out: Floats) -> None:
         for camera, rows in _by_camera(self.camera):
-            arm = self.point[rows] - state.centre[camera]
+            offset = self.point[rows] - state.centre[camera]
             by_depth = self.side[rows] - self.blur[rows] * (state.focus[camera] - self.focal[rows])
             pull = np.zeros((len(rows), 3))
             pull[:, 2] = multipliers[rows] * by_depth
-            _add_linear(out, state, camera, pull.sum(axis=0), pull.T @ arm)
+            _add_linear(out, state, camera, pull.sum(axis=0), pull.T @ offset)
             cross = -multipliers[rows] * self.blur[rows]
             at, focus = PER_CAMERA * camera, PER_CAMERA * camera + FOCUS
             mixed = np.empty(6)
-            mixed[ANGLES] = state.rotation_1[camera][:, 2, :] @ (cross @ arm)
-            mixed[PLACE] = -cross.sum() * state.axis[camera]
+            mixed[ANGLES] = state.rotation_1[camera][:, 2, :] @ (cross @ offset)
+            mixed[POSITION] = -cross.sum() * state.axis[camera]
             out[at : at + 6, focus] += mixed
             out[focus, at : at + 6] += mixed
 
@@ -133,9 +133,9 @@ class MeanImageCoordinate(Block):
 
     def _local(self, state: NetworkState, row: int) -> tuple[Floats, Floats, Floats]:
         """Weights (p,), arms (p, 3) and camera coordinates (p, 3) for one row."""
-        arm = self.points[0] - state.centre[self.camera[row]]
-        weight = np.full(len(arm), 1.0 / len(arm))
-        return weight, arm, arm @ state.rotation[self.camera[row]].T
+        offset = self.points[0] - state.centre[self.camera[row]]
+        weight = np.full(len(offset), 1.0 / len(offset))
+        return weight, offset, offset @ state.rotation[self.camera[row]].T
 
     def value(self, state: NetworkState) -> Floats:
         out = np.empty(self.rows)
@@ -156,10 +156,10 @@ class MeanImageCoordinate(Block):
         out = np.empty((self.rows, 6))
         for row in range(self.rows):
             k = self.camera[row]
-            weight, arm, p = self._local(state, row)
+            weight, offset, p = self._local(state, row)
             slope = self._slope(row, weight, p)
-            out[row, ANGLES] = np.einsum("akm,km->a", state.rotation_1[k], slope.T @ arm)
-            out[row, PLACE] = -slope.sum(axis=0) @ state.rotation[k]
+            out[row, ANGLES] = np.einsum("akm,km->a", state.rotation_1[k], slope.T @ offset)
+            out[row, POSITION] = -slope.sum(axis=0) @ state.rotation[k]
         return out
 
     def add_hessian(self, state: NetworkState, multipliers: Floats, out: Floats) -> None:
@@ -169,15 +169,15 @@ class MeanImageCoordinate(Block):
                 continue
             # The rows of a camera are functions of the same points, so their weighted sum is one
             # function of them, here u x/z + v y/z.
-            weight, arm, p = self._local(state, rows[0])
+            weight, offset, p = self._local(state, rows[0])
             slope = sum(multipliers[row] * self._slope(row, weight, p) for row in rows)
             pull = np.zeros(2)
             np.add.at(pull, self.component[rows], multipliers[rows])
-            _add_linear(out, state, k, slope.sum(axis=0), slope.T @ arm)
-            by_pose = np.empty((3, len(arm), 6))
+            _add_linear(out, state, k, slope.sum(axis=0), slope.T @ offset)
+            by_pose = np.empty((3, len(offset), 6))
             for axis in range(3):
-                by_pose[axis, :, ANGLES] = arm @ state.rotation_1[k][:, axis].T
-                by_pose[axis, :, PLACE] = -state.rotation[k][axis]
+                by_pose[axis, :, ANGLES] = offset @ state.rotation_1[k][:, axis].T
+                by_pose[axis, :, POSITION] = -state.rotation[k][axis]
             depth, z = by_pose[2], p[:, 2]
             lead = pull[0] * by_pose[0] + pull[1] * by_pose[1]
             cross = (lead * (-weight / z**2)[:, None]).T @ depth

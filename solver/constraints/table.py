@@ -16,15 +16,15 @@ from geometry.arrays import Bools, Floats
 from geometry.camera import RigCamera
 from geometry.optics import blur_disk_mm
 from solver.constraints.base import WeightedSum
-from solver.constraints.body_candidates import body_rows
-from solver.constraints.candidates import Candidates
-from solver.constraints.pose_candidates import place_rows
-from solver.problem import Scene
+from solver.constraints.builders.bodies import body_constraints
+from solver.constraints.builders.positions import position_constraints
+from solver.constraints.candidates import CandidateConstraints
+from solver.problem import Problem
 from solver.result import ConstraintRow, CoverageShare, Sense
 from solver.variables import PER_CAMERA
 
 SATISFIED = 1e-6
-"""Relative breach up to which a limit counts as met: what the solver leaves by rounding."""
+"""Relative violation up to which a limit counts as met: what the solver leaves by rounding."""
 
 BINDING = 1e-3
 """Relative slack below which a limit is said to bind."""
@@ -55,28 +55,28 @@ def row(
 
 
 def constraint_table(
-    scene: Scene, visible: list[Bools], coverage: tuple[CoverageShare, ...]
+    problem: Problem, visible: list[Bools], coverage: tuple[CoverageShare, ...]
 ) -> tuple[ConstraintRow, ...]:
     """All limits that are switched on.
 
     ``visible`` (n, q) per head position of the scene's visibility positions.
     """
-    state = scene.unknowns.state(scene.start_values())
+    state = problem.unknowns.state(problem.start_values())
     rows: list[ConstraintRow] = []
     seen = np.logical_or.reduce(visible)
-    for i, camera in enumerate(scene.cameras):
-        rows += _of_camera(scene, camera, seen[i])
-    rows += _means(scene)
-    for candidates in place_rows(scene, state) + body_rows(scene, state):
-        rows += _of_block(scene, candidates)
-    rows += _of_coverage(scene, coverage)
-    rows += _of_bounds(scene)
+    for i, camera in enumerate(problem.cameras):
+        rows += _of_camera(problem, camera, seen[i])
+    rows += _means(problem)
+    for candidates in position_constraints(problem, state) + body_constraints(problem, state):
+        rows += _of_block(problem, candidates)
+    rows += _of_coverage(problem, coverage)
+    rows += _of_bounds(problem)
     return tuple(rows)
 
 
-def _of_camera(scene: Scene, camera: RigCamera, seen: Bools) -> Iterator[ConstraintRow]:
+def _of_camera(problem: Problem, camera: RigCamera, seen: Bools) -> Iterator[ConstraintRow]:
     """Frame, focus and sampling distance of one camera, in all head positions."""
-    limits, kind = scene.limits, camera.camera
+    limits, kind = problem.limits, camera.camera
     if limits.depth_of_field:
         nearest = kind.min_focus_distance_mm
         yield row(
@@ -89,8 +89,8 @@ def _of_camera(scene: Scene, camera: RigCamera, seen: Bools) -> Iterator[Constra
         )
     if not seen.any():
         return
-    corners = scene.hull(seen)
-    points = np.concatenate([p.points(corners) for p in scene.framing_positions])
+    corners = problem.hull(seen)
+    points = np.concatenate([p.points(corners) for p in problem.framing_positions])
     pixels, depth = kind.project(camera.pose, points)
     if limits.frame is not None:
         w, h = kind.image_size_px
@@ -111,7 +111,7 @@ def _of_camera(scene: Scene, camera: RigCamera, seen: Bools) -> Iterator[Constra
             nearest,
             Sense.AT_LEAST,
             "mm",
-            scene.length_mm,
+            problem.length_mm,
         )
     if limits.gsd_max_mm is not None:
         value = float(depth.max()) / kind.focal_length_px
@@ -129,10 +129,10 @@ def _largest_blur(camera: RigCamera, depth: Floats) -> float:
     )
 
 
-def _means(scene: Scene) -> Iterator[ConstraintRow]:
+def _means(problem: Problem) -> Iterator[ConstraintRow]:
     """Eqs 12 and 10, whose means are taken over the design points."""
-    source, limits = scene.subject.design_points, scene.limits
-    for camera in scene.cameras:
+    source, limits = problem.subject.design_points, problem.limits
+    for camera in problem.cameras:
         if limits.incidence.mean_max_deg is not None:
             cosine = np.clip(-(source.normals @ camera.pose.axis_rig), -1.0, 1.0)
             value = float(np.degrees(np.arccos(cosine)).mean())
@@ -141,7 +141,7 @@ def _means(scene: Scene) -> Iterator[ConstraintRow]:
     if limits.centring is None:
         return
     tolerance = limits.centring.tolerance_px
-    for camera in scene.cameras:
+    for camera in problem.cameras:
         local = camera.pose.to_camera(source.points_mm)
         mean = (local[:, :2] / local[:, 2:]).mean(axis=0) * camera.camera.focal_length_px
         width = float(camera.camera.image_size_px[0])
@@ -160,10 +160,10 @@ def _subjects(columns: bytes, width: int) -> tuple[tuple[int, ...], ...]:
     return tuple(tuple(dict.fromkeys(line)) for line in cameras.tolist())
 
 
-def _of_block(scene: Scene, candidates: Candidates) -> Iterator[ConstraintRow]:
+def _of_block(problem: Problem, candidates: CandidateConstraints) -> Iterator[ConstraintRow]:
     """Rows of places and bodies, the worst of each camera or pair."""
     block = candidates.block
-    state = scene.unknowns.state(scene.start_values())
+    state = problem.unknowns.state(problem.start_values())
     value = block.value(state)
     slack = np.minimum(value - block.lower, block.upper - value)
     if isinstance(block, WeightedSum):
@@ -176,7 +176,7 @@ def _of_block(scene: Scene, candidates: Candidates) -> Iterator[ConstraintRow]:
         if subject not in worst or slack[k] < slack[worst[subject]]:
             worst[subject] = k
     for subject, k in worst.items():
-        who = "-".join(scene.cameras[i].name for i in subject) if subject[0] >= 0 else "all"
+        who = "-".join(problem.cameras[i].name for i in subject) if subject[0] >= 0 else "all"
         low, high = block.lower[k], block.upper[k]
         natural = block.natural
         clearance = block.family in _CLEARANCES
@@ -195,7 +195,7 @@ def _of_block(scene: Scene, candidates: Candidates) -> Iterator[ConstraintRow]:
             sense = Sense.AT_LEAST if np.isfinite(low) else Sense.AT_MOST
             limit = low if np.isfinite(low) else high
             # Distances of covering spheres are told as clearances between them.
-            shift = limit - _clearance(scene, block.family) / natural if clearance else 0.0
+            shift = limit - _clearance(problem, block.family) / natural if clearance else 0.0
             yield row(
                 f"{block.family}/{who}",
                 (value[k] - shift) * natural,
@@ -209,9 +209,9 @@ def _of_block(scene: Scene, candidates: Candidates) -> Iterator[ConstraintRow]:
 _CLEARANCES = ("body_clearance", "sight_line", "zone_allowed", "zone_forbidden")
 
 
-def _clearance(scene: Scene, family: str) -> float:
+def _clearance(problem: Problem, family: str) -> float:
     """The clearance that the limit asks for between two solids, mm."""
-    limits = scene.limits
+    limits = problem.limits
     asked = {
         "body_clearance": limits.body_clearance_mm,
         "sight_line": limits.sight_line_clearance_mm,
@@ -219,19 +219,19 @@ def _clearance(scene: Scene, family: str) -> float:
     return asked.get(family) or 0.0
 
 
-def _of_coverage(scene: Scene, coverage: tuple[CoverageShare, ...]) -> Iterator[ConstraintRow]:
+def _of_coverage(problem: Problem, coverage: tuple[CoverageShare, ...]) -> Iterator[ConstraintRow]:
     reached = {c.views: c.share for c in coverage}
-    for tier in scene.limits.coverage.tiers:
-        share = reached.get(min(tier.views, scene.count), 0.0)
+    for tier in problem.limits.coverage.tiers:
+        share = reached.get(min(tier.views, problem.count), 0.0)
         yield row(f"coverage_{tier.views}/all", share, tier.share, Sense.AT_LEAST, "", 1.0)
 
 
-def _of_bounds(scene: Scene) -> Iterator[ConstraintRow]:
+def _of_bounds(problem: Problem) -> Iterator[ConstraintRow]:
     """Eq 8 about the anchor, the tightest coordinate of each kind."""
-    box = scene.limits.bounds
-    if box is None or scene.anchor is None:
+    box = problem.limits.bounds
+    if box is None or problem.anchor is None:
         return
-    for camera, anchor in zip(scene.cameras, scene.anchor, strict=True):
+    for camera, anchor in zip(problem.cameras, problem.anchor, strict=True):
         turned = camera.pose.omega_phi_kappa_deg - anchor.omega_phi_kappa_deg
         turned = (turned + 180.0) % 360.0 - 180.0
         moved = camera.pose.position_rig_mm - anchor.position_rig_mm

@@ -1,1 +1,1 @@
-"""Who sees what: visibility, required views, visibility cuts."""
+"""Who sees what: rays cast, views assigned to cameras, cuts that keep hidden points in view."""

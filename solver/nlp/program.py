@@ -1,15 +1,13 @@
-"""The nonlinear programme of one working set: cost, rows, bounds, and what is free."""
+"""What is to be minimised: a cost, all candidate constraints, bounds."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Protocol
 
-import numpy as np
-
-from geometry.arrays import Bools, Floats, Ints
-from solver.constraints.base import Block
+from geometry.arrays import Floats
+from solver.constraints.candidates import CandidateConstraints
 from solver.variables import NetworkState, Unknowns
 
 
@@ -27,219 +25,41 @@ class Cost(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Programme:
-    """Minimise ``cost + prices . concessions`` subject to rows and bounds.
+class NonlinearProgram:
+    """Cost, candidate constraints, bounds of all unknowns (7 n,).
 
-    The variables are the free unknowns followed by the concessions, zero or more: one for each
-    of the ``soft`` families, by which all its rows may be broken, and one for each row of the
-    families in ``each``, where a row that cannot be had must not excuse the others. ``lower``
-    and ``upper`` (7 n,) bound all unknowns. ``frozen`` (7 n,) holds the unknowns that do not
-    change.
+    Rows of the families in ``each`` are relaxed one by one at the fixed ``each_penalty``: one
+    that costs more than that is given up. The other families are penalised by their worst row,
+    and the penalty rises until they hold. ``weights`` make a violation of some families dearer
+    than of others.
     """
 
     unknowns: Unknowns
     cost: Cost
-    blocks: tuple[Block, ...]
-    lower: Floats
-    upper: Floats
-    frozen: Floats
-    soft: tuple[str, ...] = ()
+    rows: list[CandidateConstraints]
+    bounds: tuple[Floats, Floats]
     each: tuple[str, ...] = ()
-    soft_prices: tuple[float, ...] = ()
-    each_price: float = 1.0
+    each_penalty: float = 10.0
+    weights: Mapping[str, float] = field(default_factory=dict)
 
     @property
-    def free(self) -> Ints:
-        """Indices of the free unknowns."""
-        return self.unknowns.free
+    def families(self) -> tuple[str, ...]:
+        """Names of the families penalised by their worst row."""
+        names = dict.fromkeys(r.block.family for r in self.rows)
+        return tuple(n for n in names if n not in self.each)
 
-    @property
-    def size(self) -> int:
-        """Number of variables."""
-        return len(self.free) + self.concession_count
-
-    @cached_property
-    def concession_count(self) -> int:
-        """Number of concessions."""
-        rows = sum(b.rows for b in self.blocks if b.family in self.each)
-        return len(self.soft) + rows
-
-    @cached_property
-    def prices(self) -> Floats:
-        """Price of each concession."""
-        each = np.full(self.concession_count - len(self.soft), self.each_price)
-        return np.concatenate([np.array(self.soft_prices), each])
-
-    @cached_property
-    def bounds(self) -> tuple[Floats, Floats]:
-        """Lower and upper bounds of the variables."""
-        none, many = np.zeros(self.concession_count), np.full(self.concession_count, np.inf)
-        return np.r_[self.lower[self.free], none], np.r_[self.upper[self.free], many]
-
-    @cached_property
-    def _sides(self) -> list[tuple[Block, Ints, float, Ints]]:
-        """Blocks with the rows used, the sign of their concession and its variables (or none)."""
-        out = []
-        none = np.zeros(0, dtype=np.int64)
-        next_each = len(self.free) + len(self.soft)
-        for block in self.blocks:
-            every = np.arange(block.rows)
-            if block.family in self.each:
-                variables = next_each + every
-                next_each += block.rows
-            elif block.family in self.soft:
-                variables = np.full(block.rows, len(self.free) + self.soft.index(block.family))
+    def violations(self, values: Floats) -> dict[str, float]:
+        """Violation of each family: its worst row, or the sum of its rows if each is penalised."""
+        state = self.unknowns.state(values)
+        total: dict[str, float] = {}
+        for r in self.rows:
+            violation, name = r.block.violation(state), r.block.family
+            if name in self.each:
+                total[name] = total.get(name, 0.0) + float(violation.sum())
             else:
-                out.append((block, every, 0.0, none))
-                continue
-            for bound_, sign in ((block.lower, 1.0), (block.upper, -1.0)):
-                rows = every[np.isfinite(bound_)]
-                if len(rows):
-                    out.append((block, rows, sign, variables[rows]))
-        return out
+                total[name] = max(total.get(name, 0.0), float(violation.max(initial=0.0)))
+        return total
 
-    @cached_property
-    def row_bounds(self) -> tuple[Floats, Floats]:
-        """Lower and upper bounds of the rows."""
-        low, high = [np.zeros(0)], [np.zeros(0)]
-        for block, rows, sign, _ in self._sides:
-            low.append(block.lower[rows] if sign >= 0.0 else np.full(len(rows), -np.inf))
-            high.append(block.upper[rows] if sign <= 0.0 else np.full(len(rows), np.inf))
-        return np.concatenate(low), np.concatenate(high)
-
-    @property
-    def rows(self) -> int:
-        """Number of rows."""
-        return len(self.row_bounds[0])
-
-    @cached_property
-    def _place(self) -> Ints:
-        """Variable of each unknown, -1 when it is not free."""
-        place = np.full(len(self.frozen), -1, dtype=np.int64)
-        place[self.free] = np.arange(len(self.free))
-        return place
-
-    @cached_property
-    def _pattern(self) -> tuple[Ints, Ints, list[Bools]]:
-        """Rows and columns of the Jacobian's entries, and per side which entries are used."""
-        row_index, column_index, used = [], [], []
-        first = 0
-        for block, rows, _, variables in self._sides:
-            columns = self._place[block.columns[rows]]
-            keep = columns >= 0
-            row_index.append(np.nonzero(keep)[0] + first)
-            column_index.append(columns[keep])
-            used.append(keep)
-            if len(variables):
-                row_index.append(np.arange(len(rows)) + first)
-                column_index.append(variables)
-            first += len(rows)
-        if not row_index:
-            return np.zeros(0, np.int64), np.zeros(0, np.int64), used
-        return np.concatenate(row_index), np.concatenate(column_index), used
-
-    @property
-    def jacobian_pattern(self) -> tuple[Ints, Ints]:
-        """Rows and columns of the entries of :meth:`jacobian`."""
-        return self._pattern[0], self._pattern[1]
-
-    @cached_property
-    def hessian_pattern(self) -> tuple[Ints, Ints]:
-        """Rows and columns of the entries of :meth:`hessian`: a lower triangle."""
-        rows, columns = np.tril_indices(len(self.free))
-        return rows, columns
-
-    def pack(self, values: Floats) -> Floats:
-        """Variables of all unknowns (7 n,), with no concessions."""
-        return np.concatenate([values[self.free], np.zeros(self.concession_count)])
-
-    def all_unknowns(self, variables: Floats) -> Floats:
-        """All unknowns (7 n,) of the variables."""
-        full = self.frozen.copy()
-        full[self.free] = variables[: len(self.free)]
-        return full
-
-    def state(self, variables: Floats) -> NetworkState:
-        """The network at the variables, remembered for the calls that follow at the same place."""
-        key = variables.tobytes()
-        if self._memory.get("key") != key:
-            self._memory["key"] = key
-            self._memory["state"] = self.unknowns.state(self.all_unknowns(variables))
-        return self._memory["state"]  # type: ignore[return-value]
-
-    @cached_property
-    def _memory(self) -> dict[str, object]:
-        return {}
-
-    def objective(self, variables: Floats) -> float:
-        """Cost and price of the concessions."""
-        extra = float(self.prices @ variables[len(self.free) :])
-        return self.cost.value(self.state(variables)) + extra
-
-    def gradient(self, variables: Floats) -> Floats:
-        """Derivative of :meth:`objective`."""
-        full = self.cost.gradient(self.state(variables))
-        return np.concatenate([full[self.free], self.prices])
-
-    def values(self, variables: Floats) -> Floats:
-        """Values of all rows."""
-        state = self.state(variables)
-        parts = [np.zeros(0)]
-        known: dict[int, Floats] = {}
-        for block, rows, sign, conceding in self._sides:
-            if id(block) not in known:
-                known[id(block)] = block.value(state)
-            give = sign * variables[conceding] if len(conceding) else 0.0
-            parts.append(known[id(block)][rows] + give)
-        return np.concatenate(parts)
-
-    def jacobian(self, variables: Floats) -> Floats:
-        """Entries of the Jacobian in the order of :attr:`jacobian_pattern`."""
-        state = self.state(variables)
-        parts = [np.zeros(0)]
-        known: dict[int, Floats] = {}
-        for (block, rows, sign, conceding), keep in zip(self._sides, self._pattern[2], strict=True):
-            if id(block) not in known:
-                known[id(block)] = block.jacobian(state)
-            parts.append(known[id(block)][rows][keep])
-            if len(conceding):
-                parts.append(np.full(len(rows), sign))
-        return np.concatenate(parts)
-
-    def hessian(self, variables: Floats, multipliers: Floats, factor: float) -> Floats:
-        """Entries of the Hessian of the Lagrangian in the order of :attr:`hessian_pattern`."""
-        state = self.state(variables)
-        size = len(self.frozen)
-        full = factor * self.cost.hessian(state) if factor else np.zeros((size, size))
-        for block, weights in zip(self.blocks, self.by_block(multipliers), strict=True):
-            if weights.any():
-                block.add_hessian(state, weights, full)
-        rows, columns = self.hessian_pattern
-        return np.asarray(full[self.free[rows], self.free[columns]])
-
-    def hessian_matrix(self, variables: Floats, multipliers: Floats) -> Floats:
-        """Hessian of the Lagrangian by the free unknowns, (free, free)."""
-        entries = self.hessian(variables, multipliers, 1.0)
-        full = np.zeros((len(self.free), len(self.free)))
-        rows, columns = self.hessian_pattern
-        full[rows, columns] = entries
-        full[columns, rows] = entries
-        return full
-
-    def by_block(self, multipliers: Floats) -> list[Floats]:
-        """Multipliers of the rows as one array per block; both sides of a soft row added up."""
-        out = {id(b): np.zeros(b.rows) for b in self.blocks}
-        first = 0
-        for block, rows, _, _ in self._sides:
-            out[id(block)][rows] += multipliers[first : first + len(rows)]
-            first += len(rows)
-        return [out[id(b)] for b in self.blocks]
-
-    def from_blocks(self, multipliers: list[Floats]) -> Floats:
-        """Inverse of :meth:`by_block`: a soft row's multiplier goes to the side of its sign."""
-        known = {id(b): m for b, m in zip(self.blocks, multipliers, strict=True)}
-        parts = [np.zeros(0)]
-        for block, rows, sign, _ in self._sides:
-            part = known[id(block)][rows]
-            parts.append(part if sign == 0.0 else np.where(part * sign < 0.0, part, 0.0))
-        return np.concatenate(parts)
+    def worst(self, violations: Mapping[str, float]) -> float:
+        """The largest violation of a family that has to hold."""
+        return max((v for name, v in violations.items() if name not in self.each), default=0.0)

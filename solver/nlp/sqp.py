@@ -1,11 +1,11 @@
 """Sequential quadratic programming with exact second derivatives and constraint exchange.
 
 Each step solves a quadratic model of the cost under the linearised rows inside a trust region;
-the quadratic programme goes to PIQP, a proximal interior-point solver. Compared with handing
+the quadratic program goes to PIQP, a proximal interior-point solver. Compared with handing
 each working set to a general interior-point solver, rows can join at every step and nothing is
 lost when they do: interior points cannot start warm, and exchange is nothing but restarts.
 
-Every family of rows may be broken at a price, so a step exists even where the linearised rows
+Every family of rows may be relaxed at a penalty, so a step exists even where the linearised rows
 contradict each other: an exact penalty on the family's worst row, or on every row of the
 families in which one that cannot be had must not excuse the others. Fletcher, Practical Methods
 of Optimization, 2nd ed., section 14.4 (S l1 QP); second-order correction as there.
@@ -13,15 +13,16 @@ of Optimization, 2nd ed., section 14.4 (S l1 QP); second-order correction as the
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import sparse
 
 from geometry.arrays import Floats
-from solver.nlp.iterate import FEASIBLE, LARGEST_PRICE, Run, Task
-from solver.nlp.program import Programme
+from solver.nlp.iterate import FEASIBLE, Iterate, Point, WorkingSet
+from solver.nlp.penalty import LARGEST_PENALTY
+from solver.nlp.program import NonlinearProgram
+from solver.nlp.quadratic import Linearised, Step, quadratic_step
 
 Watch = Callable[[int, float, float], bool]
 """Called with iteration, cost and violation; returns False to stop."""
@@ -31,13 +32,7 @@ FIRST_RADIUS = 0.2
 
 LARGEST_RADIUS = 0.5
 SMALLEST_RADIUS = 1e-9
-FIRST_PRICE = 50.0
-QP_ACCURACY = 1e-11
-"""Of the quadratic programmes; steps to a KKT error of 1e-8 need about three digits more."""
-
-_FLAT = 0.01
-"""Least curvature of a model, in start costs per squared length scale: the turn about the
-optical axis is almost free, and without any curvature such directions wander."""
+FIRST_PENALTY = 50.0
 
 CORRECTIONS = 3
 """Most second-order corrections of a step. Each costs a small part of what a new step costs, and
@@ -52,7 +47,7 @@ class Outcome:
     """Where a solve ended.
 
     ``values`` (7 n,) all unknowns; ``multipliers`` one array per block of candidate rows, with
-    ``L = f + sum multipliers . rows``; ``violation`` the worst breach of any candidate row;
+    ``L = f + sum multipliers . rows``; ``violation`` the worst violation of any candidate row;
     ``why`` a sentence without a full stop.
     """
 
@@ -66,80 +61,25 @@ class Outcome:
     why: str
 
 
-@dataclass(frozen=True, eq=False)
-class _Step:
-    """Solution of one quadratic programme."""
+@dataclass(frozen=True)
+class _Goal:
+    """When a solve may end: the error of the optimality conditions, the gain of three steps."""
 
-    move: Floats
-    multipliers: Floats
-    predicted: float
-    left: float
+    kkt_error: float
+    gain: float
 
-
-def _convex(hessian: Floats, active: Floats) -> Floats:
-    """A convex model with the curvature that counts.
-
-    At a solution the Lagrangian may bend downwards across the rows that bind, ``active``
-    (k, free), where no step goes; adding a multiple of ``active' active`` lifts it there and
-    leaves the curvature along the rows, hence the speed of convergence, alone. What bends
-    downwards even so is made nearly flat: the trust region and the rows end the step there.
-    """
-    size, basis = np.linalg.eigh(hessian)
-    lift = -2.0 * size[0]
-    if lift > 0.0 and len(active):
-        wall = active.T @ active
-        for _ in range(4):
-            size, basis = np.linalg.eigh(hessian + lift * wall)
-            if size[0] > 0.0:
-                break
-            lift *= 10.0
-    size = np.maximum(size, _FLAT)
-    return np.asarray((basis * size) @ basis.T)
-
-
-def _quadratic_step(
-    run: Run,
-    programme: Programme,
-    model: Floats,
-    gradient: Floats,
-    jacobian: sparse.csc_matrix,
-    offsets: Floats,
-) -> _Step | None:
-    """Minimise the model within the trust region; ``offsets`` (rows,) are the rows' values at 0."""
-    import piqp
-
-    free, soft = len(programme.free), programme.concession_count
-    low, high = programme.row_bounds
-    here = run.values[programme.free]
-    x_low, x_high = programme.bounds
-    box_low = np.r_[np.maximum(-run.radius, x_low[:free] - here), np.zeros(soft)]
-    box_high = np.r_[np.minimum(run.radius, x_high[:free] - here), np.full(soft, np.inf)]
-    # PIQP wants every row of its matrix bounded by numbers it can scale.
-    solver = piqp.SparseSolver()
-    solver.settings.eps_abs = QP_ACCURACY
-    solver.settings.eps_rel = QP_ACCURACY
-    quadratic = sparse.block_diag([model, sparse.csc_matrix((soft, soft))], format="csc")
-    solver.setup(
-        quadratic, gradient, None, None, jacobian, low - offsets, high - offsets, box_low, box_high
-    )
-    status = solver.solve()
-    result = solver.result
-    if (
-        status not in (piqp.Status.PIQP_SOLVED, piqp.Status.PIQP_MAX_ITER_REACHED)
-        or not np.isfinite(result.x).all()
-    ):
+    def reached(self, iterate: Iterate, kkt: float) -> str | None:
+        """Why the iterate is good enough, or None."""
+        worst = iterate.worst
+        if kkt < self.kkt_error and worst < FEASIBLE and not iterate.unpaid:
+            return "the optimality conditions hold to the tolerance"
+        if worst < max(FEASIBLE, 0.005 * self.gain) and _idle(iterate.gains, self.gain):
+            return f"three steps together gained less than {self.gain:g} of the cost"
         return None
-    move = np.clip(result.x[:free], box_low[:free], box_high[:free])
-    give = float(gradient[free:] @ np.maximum(result.x[free:], 0.0))
-    predicted = (
-        run.paid(run.breaches) - float(gradient[:free] @ move + 0.5 * move @ model @ move) - give
-    )
-    left = float(result.x[free : free + len(programme.soft)].max(initial=0.0))
-    return _Step(move, np.asarray(result.z_u - result.z_l), predicted, left)
 
 
 def minimise(
-    task: Task,
+    program: NonlinearProgram,
     start: Floats,
     watch: Watch,
     *,
@@ -147,7 +87,7 @@ def minimise(
     gain_tolerance: float = 1e-9,
     known: list[Floats] | None = None,
     max_iterations: int = 200,
-    price: float = FIRST_PRICE,
+    penalty: float = FIRST_PENALTY,
     radius: float = FIRST_RADIUS,
 ) -> Outcome:
     """Minimise from ``start`` (7 n,).
@@ -155,133 +95,115 @@ def minimise(
     Stops when the optimality conditions hold to ``tolerance``, or when the last three steps
     were feasible and together gained less than ``gain_tolerance``. ``known`` multipliers of an
     earlier solve of the same rows, to which others may have been added at the end, speed it up;
-    ``radius`` is the first trust radius and ``price`` the first price of a breach.
+    ``radius`` is the first trust radius and ``penalty`` the first penalty of a violation.
     """
-    run = Run(task, start, known, price, radius)
-    kkt, why, converged, stopped, iteration = (
-        np.inf,
-        "the limit of iterations was reached",
-        False,
-        False,
-        0,
-    )
+    goal = _Goal(tolerance, gain_tolerance)
+    iterate = Iterate.first(program, start, known, penalty, radius)
+    kkt, why, converged, stopped, iteration = np.inf, "", False, False, 0
     for iteration in range(max_iterations + 1):
-        worst = run.worst
-        if not watch(iteration, run.cost, worst):
+        if not watch(iteration, iterate.point.cost, iterate.worst):
             stopped, why = True, "stopped by request"
             break
-        programme = run.programme()
-        x = programme.pack(run.values)
-        gradient, jacobian = programme.gradient(x), _sparse(programme, x)
-        weights = programme.from_blocks(
-            [m[c] for m, c in zip(run.multipliers, run.chosen, strict=True)]
-        )
-        kkt = _kkt(run, programme, gradient, jacobian, weights)
-        if kkt < tolerance and worst < FEASIBLE and not run.unpriced:
-            converged, why = True, "the optimality conditions hold to the tolerance"
+        rows = iterate.working_set()
+        local = Linearised.at(rows.program, iterate.point.values)
+        weights = _weights(iterate, rows)
+        kkt = local.kkt_error(weights)
+        reached = goal.reached(iterate, kkt)
+        if reached is not None:
+            converged, why = True, reached
             break
-        if worst < max(FEASIBLE, 0.005 * gain_tolerance) and _idle(run.gains, gain_tolerance):
-            converged, why = (
-                True,
-                f"three steps together gained less than {gain_tolerance:g} of the cost",
-            )
-            break
-        if run.radius < SMALLEST_RADIUS:
-            if worst < FEASIBLE or run.price >= LARGEST_PRICE:
+        if iterate.radius < SMALLEST_RADIUS:
+            if iterate.worst < FEASIBLE or iterate.penalty.weight >= LARGEST_PENALTY:
                 why = "no step in reach improves the network any further"
                 break
-            run.price, run.radius = run.price * 10.0, 0.01
+            iterate = replace(iterate, penalty=iterate.penalty.raised(), radius=0.01)
             continue
         if iteration == max_iterations:
+            why = "the limit of iterations was reached"
             break
-        settling = worst < 1e-4 and run.reach < SETTLING
-        active = jacobian[np.flatnonzero(weights) if settling else []][
-            :, : len(programme.free)
-        ].toarray()
-        model = _convex(programme.hessian_matrix(x, weights), active)
-        step = _quadratic_step(run, programme, model, gradient, jacobian, programme.values(x))
-        if step is None:
-            run.radius *= 0.25
-            continue
-        _try(run, programme, step, model, gradient, jacobian)
-    return Outcome(run.values, run.multipliers, kkt, run.worst, iteration, converged, stopped, why)
+        iterate = _advance(iterate, rows, local, weights)
+    found = iterate.point.values, list(iterate.multipliers)
+    return Outcome(*found, kkt, iterate.worst, iteration, converged, stopped, why)
 
 
-def _idle(gains: list[float], tolerance: float) -> bool:
+def _weights(iterate: Iterate, rows: WorkingSet) -> Floats:
+    """Multipliers of the working rows at the iterate."""
+    known = zip(iterate.multipliers, rows.chosen, strict=True)
+    return rows.program.from_blocks([m[c] for m, c in known])
+
+
+def _idle(gains: Sequence[float], tolerance: float) -> bool:
     """Whether the last three steps together gained less than ``tolerance``."""
     return len(gains) > 2 and sum(gains[-3:]) < tolerance
 
 
-def _try(
-    run: Run,
-    programme: Programme,
-    step: _Step,
-    model: Floats,
-    gradient: Floats,
-    jacobian: sparse.csc_matrix,
-) -> None:
-    """Take the step if the merit falls as predicted; else correct it once, or shrink the region."""
-    before = run.merit(run.cost, run.breaches)
+def _advance(iterate: Iterate, rows: WorkingSet, local: Linearised, weights: Floats) -> Iterate:
+    """The next iterate: a step taken if the merit falls as predicted, else a smaller region."""
+    settling = iterate.worst < 1e-4 and iterate.step_size < SETTLING
+    model = local.model(weights, settling)
+    step = quadratic_step(iterate, local, model, local.values)
+    if step is None:
+        return replace(iterate, radius=0.25 * iterate.radius)
+    program, before = iterate.program, iterate.point.merit(iterate.program, iterate.penalty)
     noise = 1e-13 * max(1.0, abs(before))
     if step.predicted <= noise:
-        run.remember(programme, step.multipliers)
-        # Nothing is left to gain here at this price; what is still broken needs a higher one.
-        broken = run.worst > FEASIBLE
-        run.price = min(run.price * 10.0, LARGEST_PRICE) if broken else run.price
-        run.radius *= 0.25
-        return
+        return _nothing_to_gain(iterate, rows, step)
+    predicted = step.predicted
     for attempt in range(1 + CORRECTIONS):
-        trial, cost, breaches = _at(run, programme, step.move)
-        gain = before - run.merit(cost, breaches) if np.isfinite(cost) else -np.inf
-        ratio = (gain + noise) / (step.predicted + noise)
+        trial = _moved(iterate, local, step)
+        gain = -np.inf
+        if np.isfinite(trial.cost):
+            gain = before - trial.merit(program, iterate.penalty)
+        ratio = (gain + noise) / (predicted + noise)
         if ratio > 0.05:
-            reach = run.reach = float(np.abs(step.move).max(initial=0.0))
-            worst = run.worst
-            run.values, run.cost, run.breaches = trial, cost, breaches
-            run.gains.append(gain)
-            run.remember(programme, step.multipliers)
-            run.reprice(worst, step.left)
-            if ratio > 0.7 and reach > 0.8 * run.radius:
-                run.radius = min(2.0 * run.radius, LARGEST_RADIUS)
-            elif ratio < 0.25:
-                run.radius = 0.5 * max(reach, 0.1 * run.radius)
-            return
-        run.hold_violated(trial)
-        if attempt < CORRECTIONS and np.isfinite(cost):
-            shifted = (
-                programme.values(programme.pack(trial))
-                - jacobian @ np.r_[step.move, np.zeros(programme.concession_count)]
-            )
-            corrected = _quadratic_step(run, programme, model, gradient, jacobian, shifted)
-            if corrected is not None:
-                step = replace(corrected, predicted=step.predicted)
-                continue
-        break
-    run.radius = 0.3 * min(run.radius, float(np.abs(step.move).max(initial=0.0)) + 1e-12)
+            return _accepted(iterate, rows, step, trial, gain, ratio)
+        iterate = iterate.holding_violated(trial.values)
+        if attempt == CORRECTIONS or not np.isfinite(trial.cost):
+            break
+        shifted = local.shifted(trial.values, step.move)
+        corrected = quadratic_step(iterate, local, model, shifted)
+        if corrected is None:
+            break
+        step = corrected
+    size = float(np.abs(step.move).max(initial=0.0))
+    return replace(iterate, radius=0.3 * min(iterate.radius, size + 1e-12))
 
 
-def _at(run: Run, programme: Programme, move: Floats) -> tuple[Floats, float, dict[str, float]]:
-    trial = run.values.copy()
-    trial[programme.free] += move
-    cost = run.task.cost.value(run.task.unknowns.state(trial))
-    return trial, cost, run.task.breaches(trial)
-
-
-def _sparse(programme: Programme, x: Floats) -> sparse.csc_matrix:
-    row, column = programme.jacobian_pattern
-    return sparse.csc_matrix(
-        (programme.jacobian(x), (row, column)), shape=(programme.rows, programme.size)
+def _nothing_to_gain(iterate: Iterate, rows: WorkingSet, step: Step) -> Iterate:
+    """Where this penalty leaves nothing to gain; what is still violated needs a higher one."""
+    penalty = iterate.penalty.raised() if iterate.worst > FEASIBLE else iterate.penalty
+    return replace(
+        iterate,
+        multipliers=rows.multipliers(step.multipliers, iterate.multipliers),
+        penalty=penalty,
+        radius=0.25 * iterate.radius,
     )
 
 
-def _kkt(
-    run: Run, programme: Programme, gradient: Floats, jacobian: sparse.csc_matrix, weights: Floats
-) -> float:
-    """Largest entry of the Lagrangian's gradient along the free unknowns not held by a bound."""
-    free = len(programme.free)
-    residual = (gradient + jacobian.T @ weights)[:free]
-    low, high = (b[:free] for b in programme.bounds)
-    here = run.values[programme.free]
-    residual = np.where((here <= low + 1e-9) & (residual > 0.0), 0.0, residual)
-    residual = np.where((here >= high - 1e-9) & (residual < 0.0), 0.0, residual)
-    return float(np.abs(residual).max(initial=0.0))
+def _moved(iterate: Iterate, local: Linearised, step: Step) -> Point:
+    values = iterate.point.values.copy()
+    values[local.working.free] += step.move
+    return Point.at(iterate.program, values)
+
+
+def _accepted(
+    iterate: Iterate, rows: WorkingSet, step: Step, trial: Point, gain: float, ratio: float
+) -> Iterate:
+    """The iterate after a step; ``ratio`` of the gain to the predicted one sets the radius."""
+    program, radius = iterate.program, iterate.radius
+    size = float(np.abs(step.move).max(initial=0.0))
+    if ratio > 0.7 and size > 0.8 * radius:
+        radius = min(2.0 * radius, LARGEST_RADIUS)
+    elif ratio < 0.25:
+        radius = 0.5 * max(size, 0.1 * radius)
+    multipliers = rows.multipliers(step.multipliers, iterate.multipliers)
+    worst = program.worst(trial.violations)
+    return replace(
+        iterate,
+        point=trial,
+        radius=radius,
+        penalty=iterate.penalty.after_step(program, multipliers, iterate.worst, step.left, worst),
+        multipliers=multipliers,
+        step_size=size,
+        gains=(*iterate.gains, gain),
+    )

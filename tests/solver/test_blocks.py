@@ -7,17 +7,17 @@ import pytest
 import rigs
 
 from solver.constraints.base import Block, WeightedSum
-from solver.constraints.bodies import BodyDistance, BodyPairs, BodyPlanes, SightPlanes
-from solver.constraints.places import (
+from solver.constraints.bodies import BodyDistance, BodyPairs, BodyPlanes, ViewPlanes
+from solver.constraints.positions import (
     BaseHeightRatio,
     BaseLength,
-    PlaceCones,
-    PlaceCoordinate,
-    PlaceDistance,
+    PositionCones,
+    PositionCoordinate,
+    PositionDistance,
 )
 from solver.constraints.rays import FocusRays, MeanAxisIncidence, MeanImageCoordinate, RayPlanes
 from solver.information import CovarianceCost
-from solver.problem import Scene
+from solver.problem import Problem
 
 CAMERAS = 4
 UNKNOWNS = 7 * CAMERAS
@@ -28,17 +28,17 @@ TOLERANCE = 1e-7
 
 
 @pytest.fixture(scope="module")
-def scene() -> Scene:
+def problem() -> Problem:
     subject = rigs.face(40, 80)
-    return Scene(subject, rigs.face_cameras(subject, CAMERAS), rigs.face_limits())
+    return Problem(subject, rigs.face_cameras(subject, CAMERAS), rigs.face_limits())
 
 
 @pytest.fixture(scope="module")
-def values(scene: Scene) -> np.ndarray:
-    return scene.start_values() + 0.03 * np.random.default_rng(5).normal(size=UNKNOWNS)
+def values(problem: Problem) -> np.ndarray:
+    return problem.start_values() + 0.03 * np.random.default_rng(5).normal(size=UNKNOWNS)
 
 
-def blocks(scene: Scene) -> dict[str, Block]:
+def blocks(problem: Problem) -> dict[str, Block]:
     rng = np.random.default_rng(1)
     m = 12
     camera = rng.integers(0, CAMERAS, m)
@@ -65,16 +65,16 @@ def blocks(scene: Scene) -> dict[str, Block]:
             **per_camera,
             camera=every,
             component=np.array([0, 1, 0, 1]),
-            points=(scene.points,),
+            points=(problem.points,),
         ),
         "axis_incidence": MeanAxisIncidence(
-            **per_camera, camera=every, normals=(scene.subject.design_points.normals,)
+            **per_camera, camera=every, normals=(problem.subject.design_points.normals,)
         ),
-        "cones": PlaceCones(
+        "cones": PositionCones(
             **head, camera=camera, point=vectors(0.1), normal=vectors(1.0), opening=rng.random(m)
         ),
-        "distance": PlaceDistance(**head, camera=camera, point=vectors(0.1)),
-        "coordinate": PlaceCoordinate(
+        "distance": PositionDistance(**head, camera=camera, point=vectors(0.1)),
+        "coordinate": PositionCoordinate(
             **head, camera=camera, axis=rng.integers(0, 3, m), origin=rng.random(m)
         ),
         "base": BaseLength(**head, first=camera, second=other),
@@ -96,15 +96,15 @@ def blocks(scene: Scene) -> dict[str, Block]:
             first_offset=vectors(0.05),
             second_offset=vectors(0.05),
         ),
-        "sight": SightPlanes(
+        "sight": ViewPlanes(
             **head, camera=camera, other=other, offset=vectors(0.05), normal=vectors(1.0)
         ),
     }
 
 
-def dense_jacobian(block: Block, scene: Scene, at: np.ndarray) -> np.ndarray:
+def dense_jacobian(block: Block, problem: Problem, at: np.ndarray) -> np.ndarray:
     out = np.zeros((block.rows, UNKNOWNS))
-    np.put_along_axis(out, block.columns, block.jacobian(scene.unknowns.state(at)), axis=1)
+    np.put_along_axis(out, block.columns, block.jacobian(problem.unknowns.state(at)), axis=1)
     return out
 
 
@@ -127,28 +127,30 @@ def dense_jacobian(block: Block, scene: Scene, at: np.ndarray) -> np.ndarray:
         "sight",
     ],
 )
-def test_derivatives_match_central_differences(name: str, scene: Scene, values: np.ndarray) -> None:
-    block = blocks(scene)[name]
+def test_derivatives_match_central_differences(
+    name: str, problem: Problem, values: np.ndarray
+) -> None:
+    block = blocks(problem)[name]
     units = np.eye(UNKNOWNS)
 
     def value(at: np.ndarray) -> np.ndarray:
-        return block.value(scene.unknowns.state(at))
+        return block.value(problem.unknowns.state(at))
 
     numeric = np.stack(
         [(value(values + STEP * e) - value(values - STEP * e)) / (2 * STEP) for e in units], axis=1
     )
-    jacobian = dense_jacobian(block, scene, values)
+    jacobian = dense_jacobian(block, problem, values)
     assert np.abs(jacobian).max() > 0.01
     np.testing.assert_allclose(jacobian, numeric, atol=TOLERANCE * max(1.0, np.abs(jacobian).max()))
 
     weights = np.random.default_rng(2).normal(size=block.rows)
     hessian = np.zeros((UNKNOWNS, UNKNOWNS))
-    block.add_hessian(scene.unknowns.state(values), weights, hessian)
+    block.add_hessian(problem.unknowns.state(values), weights, hessian)
     by_step = [
         weights
         @ (
-            dense_jacobian(block, scene, values + STEP * e)
-            - dense_jacobian(block, scene, values - STEP * e)
+            dense_jacobian(block, problem, values + STEP * e)
+            - dense_jacobian(block, problem, values - STEP * e)
         )
         for e in units
     ]
@@ -159,21 +161,21 @@ def test_derivatives_match_central_differences(name: str, scene: Scene, values: 
     )
 
 
-def test_cost_derivatives_match_central_differences(scene: Scene, values: np.ndarray) -> None:
-    weight = np.broadcast_to(scene.ray_weight[:, None], (CAMERAS, len(scene.points)))
-    cost = CovarianceCost(scene.points, weight, scene.prior)
+def test_cost_derivatives_match_central_differences(problem: Problem, values: np.ndarray) -> None:
+    weight = np.broadcast_to(problem.ray_weight[:, None], (CAMERAS, len(problem.points)))
+    cost = CovarianceCost(problem.points, weight, problem.prior)
     cost = CovarianceCost(
-        scene.points, weight, scene.prior, cost.typical(scene.unknowns.state(values))
+        problem.points, weight, problem.prior, cost.typical(problem.unknowns.state(values))
     )
     units = np.eye(UNKNOWNS)
 
     def gradient(at: np.ndarray) -> np.ndarray:
-        return cost.gradient(scene.unknowns.state(at))
+        return cost.gradient(problem.unknowns.state(at))
 
     def value(at: np.ndarray) -> float:
-        return cost.value(scene.unknowns.state(at))
+        return cost.value(problem.unknowns.state(at))
 
-    state = scene.unknowns.state(values)
+    state = problem.unknowns.state(values)
     numeric = np.array(
         [(value(values + STEP * e) - value(values - STEP * e)) / (2 * STEP) for e in units]
     )
@@ -184,17 +186,17 @@ def test_cost_derivatives_match_central_differences(scene: Scene, values: np.nda
     np.testing.assert_allclose(cost.hessian(state), second, atol=1e-6 * np.abs(second).max())
 
 
-def test_a_point_behind_a_camera_is_not_a_number(scene: Scene, values: np.ndarray) -> None:
+def test_a_point_behind_a_camera_is_not_a_number(problem: Problem, values: np.ndarray) -> None:
     weight = np.ones((CAMERAS, 1))
-    behind = 2.0 * scene.unknowns.state(values).centre[:1]
-    cost = CovarianceCost(behind, weight, scene.prior)
-    assert np.isnan(cost.value(scene.unknowns.state(values)))
+    behind = 2.0 * problem.unknowns.state(values).centre[:1]
+    cost = CovarianceCost(behind, weight, problem.prior)
+    assert np.isnan(cost.value(problem.unknowns.state(values)))
 
 
-def test_taking_rows_keeps_their_values(scene: Scene, values: np.ndarray) -> None:
-    state = scene.unknowns.state(values)
+def test_taking_rows_keeps_their_values(problem: Problem, values: np.ndarray) -> None:
+    state = problem.unknowns.state(values)
     rows = np.array([3, 0, 7])
-    for name, block in blocks(scene).items():
+    for name, block in blocks(problem).items():
         if block.rows > 7:
             np.testing.assert_array_equal(
                 block.take(rows).value(state), block.value(state)[rows], err_msg=name

@@ -209,8 +209,8 @@ def test_contradicting_limits_are_named_with_what_each_would_have_to_give() -> N
     named = {c.family: c for c in found.solver.conflicts}
     # 450 mm away the depth of the ellipsoid cannot be sharp at f/16 and 2 px, nor fit the frame.
     assert {"stand_off_max", "depth_of_field"} & set(named)
-    assert any(c.give > 0.0 for c in named.values())
-    alone = named["stand_off_max"].give_alone
+    assert any(c.amount > 0.0 for c in named.values())
+    alone = named["stand_off_max"].amount_alone
     assert alone is not None
     wider = replace(limits, stand_off=StandOff(400.0, 450.0 + 1.2 * alone))
     assert place(wider).feasible

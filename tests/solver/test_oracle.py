@@ -8,19 +8,19 @@ import rigs
 
 from benchmarks.oracle import cost_expression
 from solver.information import CovarianceCost
-from solver.problem import Scene
+from solver.problem import Problem
 
 
 def test_cost_gradient_and_hessian_agree_with_automatic_differentiation() -> None:
     subject = rigs.face(25, 60)
-    scene = Scene(subject, rigs.face_cameras(subject, 4), rigs.face_limits())
+    problem = Problem(subject, rigs.face_cameras(subject, 4), rigs.face_limits())
     rng = np.random.default_rng(3)
-    values = scene.start_values() + 0.03 * rng.normal(size=28)
-    weight = scene.ray_weight[:, None] * (rng.random((4, 25)) < 0.8)
-    state = scene.unknowns.state(values)
-    scale = CovarianceCost(scene.points, weight, scene.prior).typical(state)
-    cost = CovarianceCost(scene.points, weight, scene.prior, scale)
-    x, expression = cost_expression(scene.unknowns, scene.points, weight, scene.prior, scale)
+    values = problem.start_values() + 0.03 * rng.normal(size=28)
+    weight = problem.ray_weight[:, None] * (rng.random((4, 25)) < 0.8)
+    state = problem.unknowns.state(values)
+    scale = CovarianceCost(problem.points, weight, problem.prior).typical(state)
+    cost = CovarianceCost(problem.points, weight, problem.prior, scale)
+    x, expression = cost_expression(problem.unknowns, problem.points, weight, problem.prior, scale)
     hessian, gradient = ca.hessian(expression, x)
     oracle = ca.Function("oracle", [x], [expression, gradient, hessian])
     value, slope, bend = (np.array(v).squeeze() for v in oracle(values))

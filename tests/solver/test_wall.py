@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 import rigs
 
-from solver.coverage.visibilitycuts import in_frame
+from solver.coverage.views import in_frame
 from solver.design import design
 from solver.limits import BaseHeight, Limits, PoseBounds
 from solver.quality import base_height_table, evaluate

@@ -20,9 +20,9 @@ from geometry.surface import SurfacePoints
 from solver.constraints.table import constraint_table
 from solver.information import normal_matrices
 from solver.limits import BaseHeight, Coverage, Limits
-from solver.quality import Sightings
+from solver.quality import Observations
 from solver.result import ConstraintRow, Sense
-from solver.problem import Scene
+from solver.problem import Problem
 
 SAMPLE = 500
 """How many check points stand for the others where only means are asked for."""
@@ -70,15 +70,15 @@ class Network:
         self._subject, self._limits = subject, limits
         self.cameras = list(cameras)
         self.margins: dict[str, float] = {}
-        scene = Scene(subject, cameras, limits)
+        scene = Problem(subject, cameras, limits)
         self._positions = scene.visibility_positions
         self._framing = scene.framing_positions
         self._prior = 1.0 / limits.coverage.unseen_sigma_mm**2
-        sightings = [Sightings.of(scene, position) for position in self._positions]
-        hulls = [scene.hull(np.logical_or.reduce([s.visible[i] for s in sightings])) for i in
+        observations = [Observations.of(scene, position) for position in self._positions]
+        hulls = [scene.hull(np.logical_or.reduce([s.visible[i] for s in observations])) for i in
                  range(len(cameras))]  # fmt: skip
         self._depth_points = [np.concatenate([p.points(h) for p in self._framing]) for h in hulls]
-        self._framed = np.stack([s.framed for s in sightings], axis=1)
+        self._framed = np.stack([s.framed for s in observations], axis=1)
         self._thin = _thinned(subject, SAMPLE)
         self._outer = [_thinned(subject, RIM_SAMPLE, hull) for hull in hulls]
         self._info = np.stack([self._information(c) for c in cameras])
@@ -111,13 +111,13 @@ class Network:
         who = self._company[index]
         cameras = tuple(camera if k == index else self.cameras[k] for k in who)
         limits = self._local if len(who) == len(self.cameras) else _without_means(self._local)
-        scene = Scene(self._outer[index], cameras, limits)
-        alone = Scene(self._outer[index], (camera,), limits)
+        scene = Problem(self._outer[index], cameras, limits)
+        alone = Problem(self._outer[index], (camera,), limits)
         visible = []
         for position in self._positions:
             # What the others see is not asked for: their own rows do not change.
             seen = np.zeros((len(who), len(scene.subject.check_points)), dtype=bool)
-            seen[who.index(index)] = Sightings.of(alone, position).visible[0]
+            seen[who.index(index)] = Observations.of(alone, position).visible[0]
             visible.append(seen)
         table = constraint_table(scene, visible, ())
         return {row.name: row for row in table if self._speaks_of(row, index)}
@@ -177,13 +177,13 @@ class Network:
         return breach
 
     def _sees(self, camera: RigCamera) -> Bools:
-        scene = Scene(self._subject, (camera,), self._limits)
-        return np.stack([Sightings.of(scene, p).framed[0] for p in self._positions])
+        scene = Problem(self._subject, (camera,), self._limits)
+        return np.stack([Observations.of(scene, p).framed[0] for p in self._positions])
 
     def _information(self, camera: RigCamera) -> Floats:
         """What a camera adds to the normal matrix of each sampled point, (p, 3, 3), 1/mm2."""
-        scene = Scene(self._thin, (camera,), self._limits)
-        seen = Sightings.of(scene, self._positions[0]).framed
+        scene = Problem(self._thin, (camera,), self._limits)
+        seen = Observations.of(scene, self._positions[0]).framed
         state = scene.unknowns.state(scene.start_values())
         points = scene.scaled(self._thin.check_points.points_mm)
         found = normal_matrices(state, points, seen * scene.ray_weight[:, None], 0.0)
@@ -194,7 +194,7 @@ class Network:
         total[:, range(3), range(3)] += self._prior
         return float(np.linalg.norm(np.linalg.inv(total), axis=(1, 2)).mean())
 
-    def _find_partners(self, scene: Scene) -> tuple[list[list[int]], list[list[int]]]:
+    def _find_partners(self, scene: Problem) -> tuple[list[list[int]], list[list[int]]]:
         """Each camera's partners, and the company in which its rows come out right.
 
         Partners are the camera itself, its nearest ones, and those it shares a tight limit with.
@@ -208,8 +208,8 @@ class Network:
         away = np.linalg.norm(centres[:, None] - centres[None], axis=2)
         near = away <= np.sort(away, axis=1)[:, [min(NEAREST, count - 1)]]
         linked = near | near.T
-        local = Scene(self._thin, scene.cameras, self._local)
-        visible = [Sightings.of(local, position).visible for position in self._positions]
+        local = Problem(self._thin, scene.cameras, self._local)
+        visible = [Observations.of(local, position).visible for position in self._positions]
         for row in constraint_table(local, visible, ()):
             ends = self._ends.get(row.subject, ())
             if len(ends) == 2 and relative_slack(row) < BINDING_SHARE:

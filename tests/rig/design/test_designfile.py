@@ -26,7 +26,7 @@ from rig.design.designfile import (
 )
 from rig.design.designmodel import DesignFile
 from rig.specification.examples import example_rig
-from solver.result import Concession, Design
+from solver.result import Design, Relaxation
 
 EXISTING: dict[str, Any] = {
     "schema": "rigwright.design/1",
@@ -147,7 +147,7 @@ def test_numbers_without_a_value_are_null(design: Design) -> None:
     gsd[0] = np.nan
     table = replace(quality.cameras, focus_mm=focus, gsd_mm=gsd)
     report = replace(
-        design.solver, kkt_error=float("nan"), conflicts=(Concession("frame", "px", 3.0, None),)
+        design.solver, kkt_error=float("nan"), conflicts=(Relaxation("frame", "px", 3.0, None),)
     )
     odd = replace(design, quality=replace(quality, cameras=table), solver=report)
     document = json.loads(json.dumps(full_document(odd), allow_nan=False))

@@ -23,7 +23,7 @@ from rig.report import render_report
 from rig.report.ellipsoids import ellipsoids, exaggeration, spread_sample
 from rig.report.errormap import sigma_range_mm
 from rig.report.words import family_words
-from solver.result import Concession, Design, Status
+from solver.result import Design, Relaxation, Status
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
@@ -154,8 +154,8 @@ def test_broken_limits_come_first_and_are_explained(design: Design, subject: Sub
         design.solver,
         status=Status.INFEASIBLE,
         conflicts=(
-            Concession("stand_off_max", "mm", 12.5, None),
-            Concession("gsd", "mm", 0.01, 0.02),
+            Relaxation("stand_off_max", "mm", 12.5, None),
+            Relaxation("gsd", "mm", 0.01, 0.02),
         ),
     )
     broken = replace(

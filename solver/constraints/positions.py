@@ -1,4 +1,4 @@
-"""Rows about where cameras stand: stand-off, incidence cones, horizons, base/height, spacing."""
+"""Rows about where cameras stand: stand-off, incidence, visibility cuts, base/height, spacing."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from solver.constraints.base import Block, scatter
 from solver.variables import PER_CAMERA, NetworkState
 
 
-def place_columns(cameras: Ints) -> Ints:
+def position_columns(cameras: Ints) -> Ints:
     """Columns (m, 3) of the coordinates of each row's camera."""
     return np.asarray(PER_CAMERA * np.asarray(cameras)[:, None] + np.arange(3, 6))
 
@@ -29,12 +29,12 @@ def _bending(direction: Floats, length: Floats) -> Floats:
 
 
 @dataclass(frozen=True, eq=False)
-class PlaceCones(Block):
+class PositionCones(Block):
     """``normal . (C - P) - opening |C - P|``, linear for ``opening`` 0.
 
     With ``opening = cos(limit)`` and P's normal it keeps the ray to C within the limit of
     incidence; with opening 0 and the normal of an occluder's tangent plane it keeps C above
-    P's horizon; with a zone's plane it keeps C on one side. ``camera`` (m,), ``point``,
+    a visibility cut of P; with a zone's plane it keeps C on one side. ``camera`` (m,), ``point``,
     ``normal`` (m, 3), ``opening`` (m,).
     """
 
@@ -45,12 +45,12 @@ class PlaceCones(Block):
 
     @property
     def columns(self) -> Ints:
-        return place_columns(self.camera)
+        return position_columns(self.camera)
 
     def value(self, state: NetworkState) -> Floats:
-        way = state.centre[self.camera] - self.point
-        _, length = _unit(way)
-        return np.asarray(np.einsum("rk,rk->r", self.normal, way) - self.opening * length)
+        ray = state.centre[self.camera] - self.point
+        _, length = _unit(ray)
+        return np.asarray(np.einsum("rk,rk->r", self.normal, ray) - self.opening * length)
 
     def jacobian(self, state: NetworkState) -> Floats:
         direction, _ = _unit(state.centre[self.camera] - self.point)
@@ -63,7 +63,7 @@ class PlaceCones(Block):
 
 
 @dataclass(frozen=True, eq=False)
-class PlaceDistance(Block):
+class PositionDistance(Block):
     """``|C - P|``: the stand-off. ``camera`` (m,), ``point`` (m, 3)."""
 
     camera: Ints
@@ -71,7 +71,7 @@ class PlaceDistance(Block):
 
     @property
     def columns(self) -> Ints:
-        return place_columns(self.camera)
+        return position_columns(self.camera)
 
     def value(self, state: NetworkState) -> Floats:
         return np.asarray(np.linalg.norm(state.centre[self.camera] - self.point, axis=1))
@@ -85,7 +85,7 @@ class PlaceDistance(Block):
 
 
 @dataclass(frozen=True, eq=False)
-class PlaceCoordinate(Block):
+class PositionCoordinate(Block):
     """``C[axis] - origin``: one coordinate of a camera. ``camera``, ``axis``, ``origin`` (m,)."""
 
     camera: Ints
@@ -115,7 +115,7 @@ class BaseLength(Block):
 
     @property
     def columns(self) -> Ints:
-        return np.hstack([place_columns(self.first), place_columns(self.second)])
+        return np.hstack([position_columns(self.first), position_columns(self.second)])
 
     def value(self, state: NetworkState) -> Floats:
         return np.asarray(
@@ -149,7 +149,7 @@ class BaseHeightRatio(Block):
 
     @property
     def columns(self) -> Ints:
-        return np.hstack([place_columns(self.first), place_columns(self.second)])
+        return np.hstack([position_columns(self.first), position_columns(self.second)])
 
     def _parts(self, state: NetworkState) -> tuple[Floats, ...]:
         base, length = _unit(state.centre[self.first] - state.centre[self.second])

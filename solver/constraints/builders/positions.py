@@ -9,9 +9,14 @@ from scipy.spatial import Delaunay, QhullError
 
 from geometry.arrays import Floats, Ints
 from solver.constraints.base import Block, WeightedSum, bound
-from solver.constraints.candidates import Candidates
-from solver.constraints.places import BaseHeightRatio, BaseLength, PlaceCoordinate, PlaceDistance
-from solver.problem import Scene
+from solver.constraints.candidates import CandidateConstraints
+from solver.constraints.positions import (
+    BaseHeightRatio,
+    BaseLength,
+    PositionCoordinate,
+    PositionDistance,
+)
+from solver.problem import Problem
 from solver.variables import PER_CAMERA, NetworkState
 
 _INF = np.inf
@@ -53,9 +58,9 @@ def delaunay_edges(centres: Floats) -> tuple[Ints, Ints]:
     return table[:, 0], table[:, 1]
 
 
-def _base_height(scene: Scene, state: NetworkState) -> list[Candidates]:
-    limit = scene.limits.base_height
-    first, second = camera_pairs(scene.count)
+def _base_height(problem: Problem, state: NetworkState) -> list[CandidateConstraints]:
+    limit = problem.limits.base_height
+    first, second = camera_pairs(problem.count)
     out = []
 
     def ratios(family: str, one: Ints, two: Ints, low: float, high: float) -> BaseHeightRatio:
@@ -67,13 +72,17 @@ def _base_height(scene: Scene, state: NetworkState) -> list[Candidates]:
     if len(first) == 0:
         return []
     if limit.min is not None:
-        out.append(Candidates.all_of(ratios("base_height_min", first, second, limit.min, _INF)))
+        out.append(
+            CandidateConstraints.all_of(ratios("base_height_min", first, second, limit.min, _INF))
+        )
     if limit.max is not None:
-        out.append(Candidates.all_of(ratios("base_height_max", first, second, -_INF, limit.max)))
+        out.append(
+            CandidateConstraints.all_of(ratios("base_height_max", first, second, -_INF, limit.max))
+        )
     if limit.neighbour_max is not None:
         one, two = nearest_neighbours(state.centre)
         block = ratios("base_height_neighbour", one, two, -_INF, limit.neighbour_max)
-        out.append(Candidates.all_of(block))
+        out.append(CandidateConstraints.all_of(block))
     for family, low, high in (
         ("base_height_mean_min", limit.mean_min, None),
         ("base_height_mean_max", None, limit.mean_max),
@@ -81,13 +90,13 @@ def _base_height(scene: Scene, state: NetworkState) -> list[Candidates]:
         if low is not None or high is not None:
             inner = ratios(family, first, second, -_INF, _INF)
             weights = np.full((1, len(first)), 1.0 / len(first))
-            row = _sum(scene, family, "", 1.0, _or(low, -_INF), _or(high, _INF), inner, weights)
-            out.append(Candidates.all_of(row))
+            row = _sum(problem, family, "", 1.0, _or(low, -_INF), _or(high, _INF), inner, weights)
+            out.append(CandidateConstraints.all_of(row))
     return out
 
 
 def _sum(
-    scene: Scene,
+    problem: Problem,
     family: str,
     unit: str,
     natural: float,
@@ -104,14 +113,14 @@ def _sum(
         np.array([high]),
         inner,
         weights,
-        PER_CAMERA * scene.count,
+        PER_CAMERA * problem.count,
     )
 
 
-def _stand_off(scene: Scene) -> list[Candidates]:
-    limit, scale = scene.limits.stand_off, scene.length_mm
-    every = np.arange(scene.count)
-    origin = np.zeros((scene.count, 3))
+def _stand_off(problem: Problem) -> list[CandidateConstraints]:
+    limit, scale = problem.limits.stand_off, problem.length_mm
+    every = np.arange(problem.count)
+    origin = np.zeros((problem.count, 3))
     out = []
     for family, low, high in (
         ("stand_off_min", limit.min_mm, None),
@@ -120,16 +129,16 @@ def _stand_off(scene: Scene) -> list[Candidates]:
         if low is None and high is None:
             continue
         lower, upper = _or(low, -_INF) / scale, _or(high, _INF) / scale
-        block = PlaceDistance(
+        block = PositionDistance(
             family, "mm", scale, bound(lower, every), bound(upper, every), every, origin
         )
-        out.append(Candidates.all_of(block))
+        out.append(CandidateConstraints.all_of(block))
     return out
 
 
-def _spacing(scene: Scene, state: NetworkState) -> list[Candidates]:
-    limit, scale = scene.limits.spacing, scene.length_mm
-    if limit is None or scene.count < 2:
+def _spacing(problem: Problem, state: NetworkState) -> list[CandidateConstraints]:
+    limit, scale = problem.limits.spacing, problem.length_mm
+    if limit is None or problem.count < 2:
         return []
     first, second = delaunay_edges(state.centre)
     inner = BaseLength(
@@ -140,7 +149,11 @@ def _spacing(scene: Scene, state: NetworkState) -> list[Candidates]:
         (limit.edge_mm + limit.tolerance_mm) / scale,
     )
     weights = np.full((1, len(first)), 1.0 / len(first))
-    return [Candidates.all_of(_sum(scene, "spacing", "mm", scale, low, high, inner, weights))]
+    return [
+        CandidateConstraints.all_of(
+            _sum(problem, "spacing", "mm", scale, low, high, inner, weights)
+        )
+    ]
 
 
 def median_weights(values: Floats) -> Floats:
@@ -152,8 +165,8 @@ def median_weights(values: Floats) -> Floats:
     return out
 
 
-def _symmetry(scene: Scene, state: NetworkState) -> list[Candidates]:
-    limit, scale, n = scene.limits.symmetry, scene.length_mm, scene.count
+def _symmetry(problem: Problem, state: NetworkState) -> list[CandidateConstraints]:
+    limit, scale, n = problem.limits.symmetry, problem.length_mm, problem.count
     if limit is None:
         return []
     out = []
@@ -171,7 +184,7 @@ def _symmetry(scene: Scene, state: NetworkState) -> list[Candidates]:
         ):
             if tolerance is None:
                 continue
-            inner = PlaceCoordinate(
+            inner = PositionCoordinate(
                 family,
                 "mm",
                 scale,
@@ -182,16 +195,16 @@ def _symmetry(scene: Scene, state: NetworkState) -> list[Candidates]:
                 np.zeros(n),
             )
             band = tolerance / scale
-            row = _sum(scene, family, "mm", scale, -band, band, inner, weights[None])
-            out.append(Candidates.all_of(row))
+            row = _sum(problem, family, "mm", scale, -band, band, inner, weights[None])
+            out.append(CandidateConstraints.all_of(row))
     return out
 
 
-def place_rows(scene: Scene, state: NetworkState) -> list[Candidates]:
+def position_constraints(problem: Problem, state: NetworkState) -> list[CandidateConstraints]:
     """All candidate rows about places."""
     return (
-        _stand_off(scene)
-        + _base_height(scene, state)
-        + _spacing(scene, state)
-        + _symmetry(scene, state)
+        _stand_off(problem)
+        + _base_height(problem, state)
+        + _spacing(problem, state)
+        + _symmetry(problem, state)
     )

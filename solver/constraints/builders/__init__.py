@@ -1,0 +1,1 @@
+"""Which constraints the limits ask for: one builder per family of geometry."""

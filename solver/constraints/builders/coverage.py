@@ -1,0 +1,61 @@
+"""Candidate constraints of coverage: incidence of assigned views, and visibility cuts."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from solver.constraints.base import bound
+from solver.constraints.candidates import CandidateConstraints, grouped
+from solver.constraints.positions import PositionCones
+from solver.coverage.assignment import AssignedViews
+from solver.coverage.cuts import VisibilityCuts
+from solver.problem import Problem
+
+_CUT_MARGIN = float(np.sin(np.radians(0.3)))
+"""A camera stays this far above a visibility cut: ray casting against facets is no more exact."""
+
+
+def assigned_view_constraints(
+    problem: Problem, assigned: AssignedViews, margin_deg: float
+) -> list[CandidateConstraints]:
+    """Incidence of every assigned ray, in every head position, (m,) rows."""
+    if len(assigned.point) == 0:
+        return []
+    scale = problem.length_mm
+    opening = np.cos(np.radians(problem.limits.incidence.ray_max_deg - margin_deg))
+    source = problem.subject.design_points
+    points, normals = source.points_mm[assigned.point], source.normals[assigned.point]
+    positions = problem.visibility_positions
+    point = np.concatenate([problem.scaled(p.points(points)) for p in positions])
+    normal = np.concatenate([p.directions(normals) for p in positions])
+    camera = np.tile(assigned.camera, len(positions))
+    block = PositionCones(
+        "coverage",
+        "mm",
+        scale,
+        bound(0.0, camera),
+        bound(np.inf, camera),
+        camera,
+        point,
+        normal,
+        bound(opening, camera),
+    )
+    return [CandidateConstraints(block, grouped(camera), 12)]
+
+
+def cut_constraints(problem: Problem, cuts: VisibilityCuts) -> list[CandidateConstraints]:
+    """The cuts as rows, all of them worked on."""
+    if len(cuts.camera) == 0:
+        return []
+    block = PositionCones(
+        "coverage",
+        "mm",
+        problem.length_mm,
+        bound(0.0, cuts.camera),
+        bound(np.inf, cuts.camera),
+        cuts.camera,
+        cuts.plane_point,
+        cuts.normal,
+        bound(_CUT_MARGIN, cuts.camera),
+    )
+    return [CandidateConstraints.all_of(block)]

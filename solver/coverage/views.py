@@ -1,0 +1,186 @@
+"""Coverage of a network in the solver's inner loop: who is seen, what is assigned, what is lost."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from geometry.arrays import Bools, Floats, Ints
+from geometry.camera import RigCamera
+from geometry.surface import SurfacePoints
+from solver.coverage.assignment import AssignedViews, Margins, assign_views
+from solver.coverage.visibility import Visibility, cast_rays, cosines, tangent_planes
+from solver.problem import Problem
+from solver.variables import NetworkState
+
+FIRST_MARGINS = Margins()
+_ABOUT_TO_BE_SEEN_DEG = 15.0
+"""How far beyond the limit of incidence points are framed: about what a camera swings by in an
+outer iteration. With less, each finds new points just outside the frame."""
+
+
+@dataclass(frozen=True, eq=False)
+class Views:
+    """What is seen at one state: ``seen`` (n, p) of the design points, and the views assigned.
+
+    ``framed`` (n, q) are the check points kept in frame and in focus: those that face the
+    camera, or would after a small move. Without the latter, every outer iteration would find new
+    points just outside the frame.
+    """
+
+    seen: Bools
+    framed: Bools
+    assigned: AssignedViews
+    margin_deg: float = 0.0
+
+    def among(self, problem: Problem, chosen: Ints) -> Views:
+        """The same views of a scene of whose design points these were the ``chosen`` ones."""
+        seen = np.zeros((problem.count, len(problem.subject.design_points)), dtype=np.bool_)
+        seen[:, chosen] = self.seen
+        assigned = AssignedViews(
+            self.assigned.camera, chosen[self.assigned.point], self.assigned.kept
+        )
+        return Views(seen, self.framed, assigned, self.margin_deg)
+
+
+def centres_mm(problem: Problem, state: NetworkState) -> Floats:
+    """Projection centres (n, 3) in the rig frame."""
+    return np.asarray(state.centre * problem.length_mm + problem.origin_mm)
+
+
+def in_frame(camera: RigCamera, points_mm: Floats, margin_px: float = 0.0) -> Bools:
+    """Which points (n, 3) fall inside a camera's image, (n,)."""
+    pixels, depth = camera.camera.project(camera.pose, points_mm)
+    w, h = camera.camera.image_size_px
+    low, high = margin_px - 0.5, -0.5 - margin_px
+    inside = (pixels > low).all(axis=1) & (pixels[:, 0] < w + high) & (pixels[:, 1] < h + high)
+    return np.asarray(inside & (depth > 0.0))
+
+
+def views(
+    problem: Problem,
+    state: NetworkState,
+    earlier: Views | None = None,
+    margins: Margins = FIRST_MARGINS,
+) -> Views:
+    """Cast all rays and decide which views to assign.
+
+    Free cameras are given frame and focus as limits, so facing and a free line of sight are
+    enough; fixed cameras only see what is in their frame. What was framed and assigned in an
+    ``earlier`` iteration is held on to, so that the outer loop settles. ``margins`` say what
+    is assigned beyond what the tiers ask.
+    """
+    source = problem.subject.design_points
+    limit = problem.limits.incidence.ray_max_deg
+    found = cast_rays(
+        source,
+        problem.subject.occluder,
+        centres_mm(problem, state),
+        limit,
+        problem.visibility_positions,
+    )
+    seen = found.seen
+    for i, camera in enumerate(problem.cameras):
+        if camera.fixed:
+            seen[i] &= in_frame(camera, source.points_mm)
+    fixed = np.array([c.fixed for c in problem.cameras])
+    framed = _facing(problem, state, min(limit + _ABOUT_TO_BE_SEEN_DEG, 90.0))
+    before = None
+    if earlier is not None:
+        framed, before = framed | earlier.framed, earlier.assigned
+    deficits = _deficits(problem, state, found, seen, margins.angle_deg)
+    assigned = assign_views(problem.limits.coverage.tiers, deficits, fixed, margins.share, before)
+    return Views(seen, framed, assigned, margins.angle_deg)
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """Coverage as it will be judged: on the check points, at the worst head position.
+
+    ``shortfall`` is the share by which the worst tier is missed, 0 when all are met;
+    ``missed`` are indices of check points that would mend it, the easiest to win first.
+    """
+
+    shortfall: float
+    missed: Ints
+
+
+def judge(problem: Problem, state: NetworkState) -> Judged:
+    """Count the views of all check points."""
+    tiers, source = problem.limits.coverage.tiers, problem.subject.check_points
+    worst, missed = 0.0, [np.zeros(0, dtype=np.int64)]
+    limit = problem.limits.incidence.ray_max_deg
+    for position in problem.visibility_positions if tiers else ():
+        found = cast_rays(
+            source, problem.subject.occluder, centres_mm(problem, state), limit, (position,)
+        )
+        seen = found.seen
+        for i, camera in enumerate(problem.cameras):
+            if camera.fixed:
+                seen[i] &= in_frame(camera, position.points(source.points_mm))
+        count = seen.sum(axis=0)
+        for tier in tiers:
+            lack = tier.share - float((count >= tier.views).mean())
+            if lack > 0.0:
+                worst = max(worst, lack)
+                missed.append(_easiest(found.cosine, count, tier.views, lack))
+    return Judged(worst, np.unique(np.concatenate(missed)))
+
+
+def _easiest(cosine: Floats, count: Ints, views_required: int, lack: float) -> Ints:
+    """Check points with too few views that come nearest to having them, enough to mend the lack."""
+    poor = np.flatnonzero(count < views_required)
+    nth_best = np.sort(cosine[:, poor], axis=0)[-min(views_required, len(cosine))]
+    enough = int(np.ceil(1.5 * lack * len(count))) + 2
+    return np.asarray(poor[np.argsort(-nth_best, kind="stable")[:enough]])
+
+
+def with_points(problem: Problem, missed: Ints) -> Problem:
+    """The scene with some check points among its design points, so that they are assigned views."""
+    if len(missed) == 0:
+        return problem
+    old, extra = problem.subject.design_points, problem.subject.check_points.subset(missed)
+    known = {p.tobytes() for p in old.points_mm}
+    fresh = [k for k, p in enumerate(extra.points_mm) if p.tobytes() not in known]
+    points = SurfacePoints(
+        np.concatenate([old.points_mm, extra.points_mm[fresh]]),
+        np.concatenate([old.normals, extra.normals[fresh]]),
+    )
+    return replace(
+        problem,
+        subject=replace(problem.subject, design_points=points),
+        origin=problem.origin_mm,
+        object_points=len(old) if problem.object_points is None else problem.object_points,
+    )
+
+
+def _facing(problem: Problem, state: NetworkState, limit_deg: float) -> Bools:
+    """Check points (n, q) whose normals are within the limit of the ray, in any head position."""
+    source = problem.subject.check_points
+    least = np.cos(np.radians(limit_deg))
+    out = np.zeros((problem.count, len(source)), dtype=np.bool_)
+    for i, centre in enumerate(centres_mm(problem, state)):
+        for position in problem.visibility_positions:
+            out[i] |= cosines(source, position.eye_seen_by_head(centre)) > least
+    return out
+
+
+def _deficits(
+    problem: Problem, state: NetworkState, found: Visibility, seen: Bools, margin_deg: float
+) -> Floats:
+    """How far each camera is from seeing each point, (n, p) degrees; see :func:`assign_views`."""
+    limit = problem.limits.incidence.ray_max_deg - margin_deg
+    incidence = np.degrees(np.arccos(np.clip(found.cosine, -1.0, 1.0)))
+    out = np.where(seen, incidence - limit - 1e-9, np.inf)
+    most = max((t.views for t in problem.limits.coverage.tiers), default=0)
+    poor = (out <= 0.0).sum(axis=0) < min(most, problem.count)
+    camera, point = np.nonzero(~seen & poor)
+    if len(camera) == 0:
+        return out
+    source = problem.subject.design_points
+    eyes = centres_mm(problem, state)[camera]
+    hidden = tangent_planes(source, problem.subject.occluder, point, eyes, source.normals[point])
+    facing = np.maximum(0.0, incidence[camera, point] - limit)
+    out[camera, point] = np.maximum(hidden.deficit_deg, facing) + 1e-6
+    return out
