@@ -18,6 +18,7 @@ os.environ.update(
 )
 
 import numpy as np
+from synthetic_scenes import Scene, bars, face_rig, stand, turned
 
 from benchmarks.draws import Draws, drawn
 from benchmarks.pages import table, write_between
@@ -27,7 +28,6 @@ from calibration.adjustment.stages import adjust_in_stages
 from calibration.adjustment.start.finding import find_start
 from calibration.adjustment.start.resection import Placed
 from calibration.observations import TargetSet
-from calibration.synthetic import Scene, bars, face_rig, stand, turned
 from geometry.arrays import Floats
 
 SIGMA_PX = 0.05

@@ -22,8 +22,6 @@ from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "support"))
-
 from memoryrig import MemoryDevices, line_fit, memory_station, with_policy
 
 from rig.acquisition.capture.rig import open_station

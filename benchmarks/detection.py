@@ -22,6 +22,8 @@ os.environ.update(
 )
 
 import numpy as np
+from held_patterns import placed_carrier, true_pixels
+from plain_opencv import plain_markers
 from scipy.spatial.transform import Rotation
 
 from calibration.detection import opencv
@@ -36,7 +38,6 @@ from calibration.targets.kinds import (
 )
 from calibration.targets.rendering import photographed, render
 from calibration.targets.ringcodes import RingCodeFamily
-from calibration.targets.scenes import placed_carrier, true_pixels
 from geometry.arrays import Floats
 from geometry.camera import Body, Camera
 
@@ -96,7 +97,7 @@ def plain(kind: CarrierKind, picture: np.ndarray, truth: dict[str, Floats]) -> F
             [p - truth[kind.ids[n]] for n, p in zip(numbers, places, strict=True)]
         ).reshape(-1, 2)
     if isinstance(kind, MarkerCarrier):
-        markers = opencv.plain_markers(picture, kind.dictionary)
+        markers = plain_markers(picture, kind.dictionary)
         pairs = zip(markers.ids.tolist(), markers.corners_px, strict=True)
         return np.array(
             [crossing(c) - truth[kind.id_of(n)] for n, c in pairs if kind.id_of(n) in truth]

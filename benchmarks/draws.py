@@ -6,13 +6,13 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
+from synthetic_scenes import Scene, face_scene
 
 from calibration.adjustment import Calibration, CalibrationOptions, calibrate
 from calibration.adjustment.camera import PER_CAMERA, CalibratedCamera
 from calibration.adjustment.forward import intersected
 from calibration.adjustment.rotations import vector_of
 from calibration.adjustment.state import camera_arrays
-from calibration.synthetic import Scene, face_scene
 from geometry.arrays import Bools, Floats
 
 LENGTHS_MM = (0.0, 60.0, 120.0, 190.0, 260.0, 330.0)

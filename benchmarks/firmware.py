@@ -12,15 +12,12 @@ from __future__ import annotations
 import argparse
 import itertools
 import random
-import sys
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT / "tests/support"))  # where the simulators' fixture lives
-
 from firmware_pulses import ALL, Burst, flood_of, offsets, played  # noqa: E402
 from firmware_sim import CLOCK_HZ, FirmwareSim, Simulator, SimulatorMissing, built  # noqa: E402
 

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import astuple, dataclass, replace
 
 import numpy as np
+from synthetic_scenes import Scene, face_scene, plate_places, turned
 
 from calibration.adjustment import Calibration, CalibrationOptions, calibrate
 from calibration.adjustment.rotations import rotation_of
@@ -15,7 +16,6 @@ from calibration.check.diagnosis import Prepared, diagnose
 from calibration.check.epoch import Epoch, epoch_of
 from calibration.check.gross import put_right
 from calibration.check.verdicts import CheckResult, Kind, Light
-from calibration.synthetic import Scene, face_scene, plate_places, turned
 from geometry.arrays import Floats, Ints
 from geometry.frames import Pose
 

@@ -14,10 +14,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from plain_opencv import video_frames
 
 from calibration.adjustment import Calibration, calibrate
 from calibration.adjustment.forward import intersected
-from calibration.detection.opencv import video_frames
 from calibration.detection.pictures import TakenPicture, detect_pictures
 from calibration.observations import Observations
 from calibration.targets.kinds import CharucoPlate, TargetPlan

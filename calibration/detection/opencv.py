@@ -1,4 +1,4 @@
-"""The one module that calls OpenCV: its majors 4 and 5 look alike from here on.
+"""The one module of detection that calls OpenCV: its majors 4 and 5 look alike from here on.
 
 Between the majors arrays lose a middle dimension and constants change their values, so every
 array is reshaped here, and constants are looked up by name at each call and never stored.
@@ -6,9 +6,7 @@ array is reshaped here, and constants are looked up by name at each call and nev
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import cv2 as _cv2
@@ -102,18 +100,6 @@ def detect_markers(grey: Bytes, dictionary: str, refine: bool = False) -> Marker
     return Markers(np.asarray(ids, dtype=np.int64).reshape(-1), places)
 
 
-def plain_markers(grey: Bytes, dictionary: str) -> Markers:
-    """Markers with OpenCV's own sub-pixel corners: what one gets without this package."""
-    parameters = cv2.aruco.DetectorParameters()
-    parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
-    detector = cv2.aruco.ArucoDetector(_dictionary(dictionary), parameters)
-    corners, ids, _ = detector.detectMarkers(grey)
-    if ids is None or len(corners) == 0:
-        return Markers(np.zeros(0, dtype=np.int64), np.zeros((0, 4, 2)))
-    places = np.asarray(corners, dtype=np.float64).reshape(-1, 4, 2)
-    return Markers(np.asarray(ids, dtype=np.int64).reshape(-1), places)
-
-
 def plain_charuco(
     grey: Bytes, squares: tuple[int, int], square_mm: float, marker_mm: float, dictionary: str
 ) -> tuple[Ints, Floats]:
@@ -195,23 +181,6 @@ def encode_png(image: AnyImage) -> bytes:
     if not done:
         raise InputError("image-encode", "the picture cannot be written as PNG", "give 8 or 16 bit")
     return bytes(data)
-
-
-def video_frames(path: Path) -> Iterator[Bytes]:
-    """The frames of a video as grey pictures, one after the other."""
-    video = cv2.VideoCapture(str(path))
-    try:
-        if not video.isOpened():
-            raise InputError(
-                "video", f"{path.name} is not a video that can be read", "give an MP4 or AVI file"
-            )
-        while True:
-            more, image = video.read()
-            if not more:
-                return
-            yield np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY))
-    finally:
-        video.release()
 
 
 def sampled(grey: Bytes, places_px: Floats) -> Floats:

@@ -11,7 +11,7 @@ import numpy as np
 from calibration.adjustment.camera import PER_CAMERA
 from calibration.adjustment.covariance import Covariance
 from common.errors import InputError
-from common.files.records import StrictModel
+from common.files.strict import StrictModel
 from geometry.arrays import Floats
 
 LARGEST_ROWS = 20_000

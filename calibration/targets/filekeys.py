@@ -4,17 +4,13 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
+
+from common.files.strict import StrictModel
 
 Triple = tuple[float, float, float]
 Sigma = Annotated[float, Field(ge=0.0, allow_inf_nan=True)]
 Sigmas = tuple[Sigma, Sigma, Sigma]
-
-
-class StrictModel(BaseModel):
-    """Unknown keys and NaN are errors."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 class RulerModel(StrictModel):
@@ -94,7 +90,7 @@ class TargetsModel(StrictModel):
 
     schema_: Literal["rigwright.targets/1"] = Field(alias="schema")
     name: str
-    plates: list[PlateModel] = []
-    markers: list[MarkersModel] = []
-    rings: list[RingsModel] = []
-    distances: list[DistanceModel] = []
+    plates: list[PlateModel] = Field(default_factory=list)
+    markers: list[MarkersModel] = Field(default_factory=list)
+    rings: list[RingsModel] = Field(default_factory=list)
+    distances: list[DistanceModel] = Field(default_factory=list)

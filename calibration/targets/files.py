@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel
 
 from calibration.observations import Distance
 from calibration.targets.filekeys import (
@@ -31,7 +30,9 @@ from calibration.targets.kinds import (
 )
 from calibration.targets.ringcodes import RingCodeFamily
 from common.errors import InputError
-from common.files.records import one_line
+from common.files import toml
+from common.files.strict import as_json
+from common.files.toml import read_text
 from common.files.writing import write_whole
 
 SCHEMA = "rigwright.targets/1"
@@ -42,27 +43,13 @@ PLACE_SIGMA_MM = (0.1, 0.1, 0.1)
 
 def read_targets(path: Path) -> TargetPlan:
     """The target set in a file. Raises a one-line :class:`InputError` naming the file."""
-    try:
-        if path.stat().st_size > LARGEST_BYTES:
-            raise InputError("targets-size", f"{path.name} is too large", "give a target file")
-        text = path.read_text("utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(
-            "targets-read", f"{path.name} cannot be read", "check the path; it must be UTF-8 text"
-        ) from error
-    return targets_from(text, path.name)
+    return targets_from(read_text(path, "targets", "target file", LARGEST_BYTES), path.name)
 
 
 def targets_from(text: str, source: str = "the target file") -> TargetPlan:
     """The target set in a file's text. Raises a one-line :class:`InputError` naming it."""
-    try:
-        model = TargetsModel.model_validate(tomllib.loads(text))
-    except tomllib.TOMLDecodeError as error:
-        problem = f"{source} is not TOML ({str(error)[:120]})"
-        raise InputError("targets-toml", problem, "correct that line") from error
-    except ValidationError as error:
-        raise one_line(error, TargetsModel, source) from error
-    return targets_of(model)
+    data = toml.parsed(text, source, "targets", "target file")
+    return targets_of(as_json(TargetsModel, data, source))
 
 
 def targets_of(model: TargetsModel) -> TargetPlan:

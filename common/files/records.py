@@ -1,27 +1,19 @@
-"""Strict reading of JSON files: models made from the domain's own dataclasses, one-line errors."""
+"""JSON files of the domain's own dataclasses: strict models made from them, and back."""
 
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import functools
 import math
 import types
 from enum import Enum
 from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
-from pydantic import BaseModel, ConfigDict, ValidationError, create_model
+from pydantic import BaseModel, create_model
 
-from common.errors import InputError
+from common.files.strict import StrictModel
 
-ModelT = TypeVar("ModelT", bound=BaseModel)
 RecordT = TypeVar("RecordT")
-
-
-class StrictModel(BaseModel):
-    """Unknown keys, NaN, and values of another type are errors."""
-
-    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
 
 
 def model_of(record: type) -> type[StrictModel]:
@@ -83,46 +75,3 @@ def plain(value: Any) -> Any:  # noqa: ANN401 - anything a record may hold
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     return value
-
-
-def parsed(model: type[ModelT], text: str | bytes, source: str) -> ModelT:
-    """A file's text as a ``model``; raises a one-line :class:`InputError` naming ``source``."""
-    try:
-        return model.model_validate_json(text)
-    except ValidationError as error:
-        raise one_line(error, model, source) from error
-
-
-def one_line(error: ValidationError, model: type[BaseModel], source: str) -> InputError:
-    """The most telling finding: another kind of file, then a misspelt key, then the rest."""
-    # A misspelt key makes another seem missing, and another kind of file misspells them all.
-    found = sorted(
-        error.errors(), key=lambda e: (e["loc"] != ("schema",), e["type"] != "extra_forbidden")
-    )
-    first, more = found[0], f" ({len(found) - 1} more after it)" if len(found) > 1 else ""
-    where = ".".join(str(part) for part in first["loc"]) or "the file"
-    if first["type"] == "json_invalid":
-        return InputError("file-json", f"{source} is not JSON", "give the file as it was written")
-    if first["type"] == "extra_forbidden":
-        close = difflib.get_close_matches(str(first["loc"][-1]), _keys_of(model), 1, 0.5)
-        remedy = f"did you mean {close[0]}?" if close else "remove it"
-        return InputError("key-unknown", f"{source}: {where} is not known{more}", remedy)
-    if first["type"] == "missing":
-        return InputError("key-missing", f"{source}: {where} is missing{more}", "add it")
-    message = first["msg"].removeprefix("Value error, ")
-    remedy = message[:1].lower() + message[1:].replace("Input should", "it should")
-    return InputError("value", f"{source}: {where} cannot be used{more}", remedy)
-
-
-def _keys_of(model: type[BaseModel]) -> list[str]:
-    """All keys that a file may have, however deep."""
-    found: dict[str, None] = {}
-    waiting: list[Any] = [model]
-    while waiting:
-        kind = waiting.pop()
-        if isinstance(kind, type) and issubclass(kind, BaseModel):
-            found.update({info.alias or name: None for name, info in kind.model_fields.items()})
-            waiting += [info.annotation for info in kind.model_fields.values()]
-        else:
-            waiting += get_args(kind)
-    return list(found)

@@ -1,13 +1,19 @@
-"""The pydantic base of every file this package reads, and its one-line errors."""
+"""Files read strictly: the pydantic base of every file, and its one-line errors.
+
+Unknown keys, NaN, and values of another type are errors. A misspelt key is answered with the
+nearest that the file may have there.
+"""
 
 from __future__ import annotations
 
+import dataclasses
 import difflib
+import json
 from collections.abc import Mapping
-from typing import Annotated, TypeVar, get_args
+from typing import Annotated, Any, TypeVar, get_args, get_type_hints
 
 from annotated_types import Len
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
 from common.errors import InputError
 
@@ -18,12 +24,15 @@ CameraName = Annotated[str, Field(pattern=r"^\w[\w .\-]{0,79}$")]
 """Letters, digits, spaces, dots, hyphens: names end up in file names, tables and pages."""
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
+RecordT = TypeVar("RecordT")
+
+STRICT = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
 
 
 class StrictModel(BaseModel):
     """Unknown keys, NaN, and values of another type are errors: a misspelt key must not vanish."""
 
-    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
+    model_config = STRICT
 
 
 def key_of(name: str, model: type[BaseModel]) -> str:
@@ -31,24 +40,48 @@ def key_of(name: str, model: type[BaseModel]) -> str:
     return model.model_fields[name].alias or name
 
 
-def keys_of(model: type[BaseModel]) -> list[str]:
-    """All keys of a model, as they stand in the file."""
-    return [key_of(name, model) for name in model.model_fields]
-
-
 def child_model(model: type[BaseModel], key: str) -> type[BaseModel] | None:
     """The model behind a key, seen through optional values and lists."""
-    for name, info in model.model_fields.items():
-        if key_of(name, model) == key:
-            return _model_in(info.annotation)
-    return None
+    found = _table_in(_tables(model).get(key))
+    return found if found is not None and issubclass(found, BaseModel) else None
 
 
-def _model_in(annotation: object) -> type[BaseModel] | None:
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+def keys_of(table: type) -> list[str]:
+    """All keys of a model or dataclass, as they stand in the file."""
+    return list(_tables(table))
+
+
+def _tables(table: type) -> dict[str, Any]:
+    """What stands behind each key of a model or dataclass."""
+    if issubclass(table, BaseModel):
+        return {key_of(n, table): f.annotation for n, f in table.model_fields.items()}
+    hints = get_type_hints(table)
+    fields = dataclasses.fields(table) if dataclasses.is_dataclass(table) else ()
+    return {f.name: hints[f.name] for f in fields}
+
+
+def _table_in(annotation: object) -> type | None:
+    """The first model or dataclass within an annotation."""
+    if isinstance(annotation, type) and (
+        issubclass(annotation, BaseModel) or dataclasses.is_dataclass(annotation)
+    ):
         return annotation
-    found = (_model_in(part) for part in get_args(annotation))
-    return next((model for model in found if model is not None), None)
+    found = (_table_in(part) for part in get_args(annotation))
+    return next((table for table in found if table is not None), None)
+
+
+def unknown_key(table: type, location: tuple[int | str, ...]) -> str:
+    """A remedy for a key at ``location`` that ``table`` does not have: the nearest that it has."""
+    owner: type | None = table
+    for part in location[:-1]:
+        # A name that is no key is one within a mapping: the mapping's own key gave its kind.
+        if isinstance(part, str) and owner is not None and part in _tables(owner):
+            owner = _table_in(_tables(owner)[part])
+    keys = keys_of(owner) if owner is not None else []
+    close = difflib.get_close_matches(str(location[-1]), keys, 1, 0.5)
+    if close:
+        return f"did you mean {close[0]}?"
+    return f"the keys here are {', '.join(keys)}" if keys else "remove it"
 
 
 def _spell(location: tuple[int | str, ...]) -> str:
@@ -58,40 +91,39 @@ def _spell(location: tuple[int | str, ...]) -> str:
     return text.removeprefix(".") or "the file"
 
 
-def unknown_key(model: type[BaseModel], location: tuple[int | str, ...]) -> str:
-    """A remedy for a key at ``location`` that a model does not have: the nearest that it has."""
-    owner: type[BaseModel] | None = model
-    for part in location[:-1]:
-        if isinstance(part, str) and owner is not None:
-            owner = child_model(owner, part)
-    keys = keys_of(owner) if owner is not None else []
-    close = difflib.get_close_matches(str(location[-1]), keys, 1, 0.5)
-    return f"did you mean {close[0]}?" if close else f"the keys here are {', '.join(keys)}"
-
-
 def _given(value: object) -> str:
     text = repr(value)
     return text if len(text) <= 40 else f"{text[:37]}..."
 
 
-def one_line(error: ValidationError, model: type[BaseModel], source: str) -> InputError:
+_UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")
+_MISSING = ("missing", "missing_argument")
+
+
+def one_line(error: ValidationError, table: type, source: str) -> InputError:
     """The most telling of pydantic's findings as an :class:`InputError`.
 
-    A misspelt key comes first: it often makes another key seem missing.
+    Another kind of file comes first, for it misspells every key; then a misspelt key, for it
+    makes another seem missing.
     """
-    findings = sorted(error.errors(), key=lambda e: e["type"] != "extra_forbidden")
+    findings = sorted(
+        error.errors(), key=lambda e: (e["loc"] != ("schema",), e["type"] not in _UNKNOWN)
+    )
     first, others = findings[0], len(findings) - 1
-    where, message = _spell(first["loc"]), first["msg"].removeprefix("Value error, ")
+    where = f"{source}: {_spell(first['loc'])}" if source else _spell(first["loc"])
+    if first["type"] == "json_invalid":
+        return InputError("file-json", f"{source} is not JSON", "give the file as it was written")
     more = f" ({others} more to mend after it)" if others else ""
-    if first["type"] == "extra_forbidden":
-        remedy = unknown_key(model, first["loc"])
-        return InputError("key-unknown", f"{source}: {where} is not known{more}", remedy)
-    if first["type"] == "missing":
-        return InputError("key-missing", f"{source}: {where} is missing{more}", "add it")
+    if first["type"] in _UNKNOWN:
+        remedy = unknown_key(table, first["loc"])
+        return InputError("key-unknown", f"{where} is not known{more}", remedy)
+    if first["type"] in _MISSING:
+        return InputError("key-missing", f"{where} is missing{more}", "add it")
+    message = first["msg"].removeprefix("Value error, ")
     message = message[:1].lower() + message[1:].replace("Input", "it")
     message = message.replace("input should", "it should")
     given = "" if isinstance(first["input"], Mapping) else f" is {_given(first['input'])}"
-    return InputError("value", f"{source}: {where}{given}{more}", message)
+    return InputError("value", f"{where}{given}{more}", message)
 
 
 def validated(
@@ -105,3 +137,36 @@ def validated(
         return model.model_validate(data, context=None if context is None else dict(context))
     except ValidationError as error:
         raise one_line(error, model, source) from error
+
+
+def parsed(model: type[ModelT], text: str | bytes, source: str) -> ModelT:
+    """A file's JSON text as a ``model``; raises a one-line :class:`InputError` naming ``source``.
+
+    Strict as JSON is: its lists serve for tuples, its texts for paths.
+    """
+    try:
+        return model.model_validate_json(text)
+    except ValidationError as error:
+        raise one_line(error, model, source) from error
+
+
+def as_json(model: type[ModelT], data: Mapping[str, Any], source: str) -> ModelT:
+    """``data`` of a TOML file as a ``model``, with lists for its tuples and texts for its paths.
+
+    Strict Python input would want tuples and paths, which TOML does not have.
+    """
+    return parsed(model, json.dumps(data, default=str), source)
+
+
+def section_of(kind: type[RecordT], data: Mapping[str, Any], section: str) -> RecordT:
+    """A dataclass from a file's section; raises a one-line :class:`InputError` naming both."""
+    # A dataclass within a model is read under the model's configuration, strictness included.
+    fields: dict[str, Any] = {section: (kind, ...)}
+    holder = create_model("Holder", __config__=STRICT, **fields)
+    try:
+        # As JSON, for the reason above.
+        read = holder.model_validate_json(json.dumps({section: data}, default=str))
+    except ValidationError as error:
+        raise one_line(error, holder, "") from error
+    value: RecordT = getattr(read, section)
+    return value

@@ -9,17 +9,18 @@ from typing import Any
 from common.errors import InputError, TooLargeError
 
 LARGEST_FILE_BYTES = 1_000_000
+"""What people write by hand is a page or two; a larger file is another one, given by mistake."""
 
 
-def read_text(path: Path, kind: str, words: str) -> str:
+def read_text(path: Path, kind: str, words: str, largest_bytes: int = LARGEST_FILE_BYTES) -> str:
     """The text of a file; ``kind`` stands in error codes, ``words`` says what it is.
 
     Raises :class:`InputError` ``<kind>-unreadable`` and ``<kind>-not-toml``,
     :class:`TooLargeError` ``<kind>-too-large``.
     """
-    remedy = f"give the {kind}'s TOML file"
+    remedy = f"give a {words} as TOML"
     try:
-        if path.stat().st_size > LARGEST_FILE_BYTES:
+        if path.stat().st_size > largest_bytes:
             problem = f"{path.name} is too large for a {words}"
             raise TooLargeError(f"{kind}-too-large", problem, remedy)
         return path.read_text(encoding="utf-8")

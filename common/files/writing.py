@@ -12,19 +12,31 @@ LARGEST_BYTES = 200_000_000
 
 
 def write_whole(path: Path, data: bytes, overwrite: bool = False) -> None:
-    """Writes to a neighbour, then renames. Raises :class:`ConflictError` when the file is there."""
+    """Writes to a neighbour, then renames; what is replaced keeps its permissions.
+
+    Raises :class:`ConflictError` when the file is there, :class:`InputError` when it cannot be
+    written.
+    """
     if path.exists() and not overwrite:
         raise ConflictError(
             "file-exists", f"{path.name} exists already", "give another name, or allow overwriting"
         )
     part = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
     try:
-        part.write_bytes(data)
-        os.replace(part, path)  # noqa: PTH105 - one system call, and the name says what it does
+        with part.open("wb") as file:
+            file.write(data)
+            file.flush()
+            # Renamed first and written later, a file would be empty after a loss of power.
+            os.fsync(file.fileno())
+        if path.exists():
+            part.chmod(path.stat().st_mode & 0o7777)
+        part.replace(path)
     except OSError as error:
         part.unlink(missing_ok=True)
         raise InputError(
-            "file-write", f"{path.name} cannot be written ({error.strerror})", "give another folder"
+            "file-write",
+            f"{path.name} cannot be written ({(error.strerror or 'unwritable').lower()})",
+            "make its folder writable, or give another",
         ) from error
 
 

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import difflib
-import secrets
-import shutil
 from pathlib import Path
 
-from common.errors import ConflictError, InputError, NotFoundError
+from common.errors import ConflictError, NotFoundError
+from common.files.folders import whole_folder
 from geometry.exchange import (
     blender,
     caliscope,
@@ -76,18 +75,7 @@ def write_export(
         raise ConflictError(
             "out-not-empty", f"{out} is there already", "choose an empty or new folder"
         )
-    half = out.parent / f".{out.name}.{secrets.token_hex(4)}.part"
-    try:
-        half.mkdir(parents=True)
+    with whole_folder(out) as half:
         for file_name, content in files.items():
             (half / file_name).write_bytes(content)
-        half.replace(out)
-    except OSError as error:
-        raise InputError(
-            "out-unwritable",
-            f"cannot write to {out} ({(error.strerror or 'unwritable').lower()})",
-            "choose another --out folder",
-        ) from error
-    finally:
-        shutil.rmtree(half, ignore_errors=True)
     return {file_name: out / file_name for file_name in files}

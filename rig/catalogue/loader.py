@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Iterable, Mapping
 from functools import cache
 from importlib.resources import files
@@ -12,8 +11,9 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from common.errors import InputError, TooLargeError
+from common.errors import InputError
 from common.files.strict import StrictModel, validated
+from common.files.toml import parsed, read_text
 from rig.catalogue.catalogue import Catalogue
 from rig.catalogue.items import (
     Adapter,
@@ -100,34 +100,11 @@ def _built_in_tables() -> Tables:
 
 
 def _read(path: Path) -> Tables:
-    try:
-        if path.stat().st_size > LARGEST_FILE_BYTES:
-            raise TooLargeError(
-                "catalogue-too-large",
-                f"{path.name} is too large for a catalogue file",
-                "give a TOML file of parts",
-            )
-        text = path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise InputError(
-            "catalogue-unreadable",
-            f"cannot read the catalogue file {path} ({(error.strerror or 'unreadable').lower()})",
-            "check the path",
-        ) from error
-    except UnicodeDecodeError as error:
-        raise InputError(
-            "catalogue-not-toml", f"{path.name} is not a text file", "give a TOML file of parts"
-        ) from error
-    return _parse(text, path.name)
+    return _parse(read_text(path, "catalogue", "catalogue file", LARGEST_FILE_BYTES), path.name)
 
 
 def _parse(text: str, name: str) -> Tables:
-    try:
-        data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(
-            "catalogue-not-toml", f"{name} is not a catalogue file: {error}", "write it as TOML"
-        ) from error
+    data = parsed(text, name, "catalogue", "catalogue file")
     outline = validated(_Outline, data, name)
     return {table: dict(getattr(outline, table)) for table in ENTRIES}
 

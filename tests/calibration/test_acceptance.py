@@ -7,12 +7,12 @@ from dataclasses import replace
 import calibrations
 import numpy as np
 import pytest
+from synthetic_scenes import Scene
 
 from calibration.acceptance import LengthLimit, Outcome, Volume, accept, certificate_pdf
 from calibration.acceptance.certificate import Heading
 from calibration.adjustment.start.resection import Placed
 from calibration.observations import Carrier, TargetSet
-from calibration.synthetic import Scene
 from common.errors import InputError
 from geometry.arrays import Floats
 

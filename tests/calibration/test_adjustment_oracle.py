@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
+from synthetic_scenes import Scene, face_rig, stand
 
 from calibration.adjustment.camera import CalibratedCamera, Interior
 from calibration.adjustment.levenberg import LossOptions, Solution, adjust
@@ -17,7 +18,6 @@ from calibration.adjustment.options import FREE, CalibrationOptions, InteriorMod
 from calibration.adjustment.start.finding import find_start
 from calibration.adjustment.start.resection import Placed
 from calibration.observations import TargetSet
-from calibration.synthetic import Scene, face_rig, stand
 from geometry.arrays import Floats
 
 SIGMA_PX = 0.1

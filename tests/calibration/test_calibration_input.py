@@ -8,11 +8,11 @@ from dataclasses import replace
 import calibrations
 import numpy as np
 import pytest
+from synthetic_scenes import Scene, face_rig, plate, plate_places, stand
 
 from calibration.adjustment import CalibrationOptions, InteriorModel, ReferencePoses, calibrate
 from calibration.adjustment.start.resection import Placed
 from calibration.observations import Carrier, Distance, Observations, TargetSet
-from calibration.synthetic import Scene, face_rig, plate, plate_places, stand
 from common.errors import InputError
 from geometry.frames import Pose
 

@@ -8,6 +8,7 @@ import calibrations
 import numpy as np
 import pytest
 from scipy.stats import kstest
+from synthetic_scenes import Scene, face_rig, face_scene, plate_places
 
 from benchmarks.trials import Bench
 from calibration.adjustment import CalibrationOptions, calibrate
@@ -18,7 +19,6 @@ from calibration.check.diagnosis import diagnose
 from calibration.check.gross import put_right
 from calibration.check.hypotheses import Cause
 from calibration.observations import Carrier, TargetSet
-from calibration.synthetic import Scene, face_rig, face_scene, plate_places
 from common.errors import CancelledError, InputError
 from geometry.frames import Pose
 

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from synthetic_scenes import PIXEL_PITCH_MM, face_rig
 
 from calibration.adjustment.camera import CalibratedCamera, Interior
 from calibration.exports import FULL_FRAME_MM, rig_cameras
-from calibration.synthetic import PIXEL_PITCH_MM, face_rig
 from common.errors import InputError
 from geometry.exchange import write_export
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from plain_opencv import video_frames
 
 from calibration.detection import opencv
 from calibration.detection.finding import find_targets
@@ -66,7 +67,7 @@ def test_the_plate_of_the_four_webcams_is_found() -> None:
     assert len(videos) == 4
     for video in videos:
         own, plain, apart = 0, 0, []
-        for number, frame in enumerate(opencv.video_frames(video)):
+        for number, frame in enumerate(video_frames(video)):
             if number % 8:
                 continue
             found = find_targets(frame, plan, explain=False)

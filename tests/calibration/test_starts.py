@@ -7,11 +7,11 @@ from dataclasses import replace
 import calibrations
 import numpy as np
 import pytest
+from synthetic_scenes import Scene, face_rig, plate, plate_places, stand, turned
 
 from calibration.adjustment import Calibration, CalibrationOptions, calibrate
 from calibration.adjustment.start.resection import Placed
 from calibration.observations import Carrier, Distance, TargetSet
-from calibration.synthetic import Scene, face_rig, plate, plate_places, stand, turned
 
 SCENE = calibrations.small_scene()
 QUICK = CalibrationOptions(cross_validate=False)

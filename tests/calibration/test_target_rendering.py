@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import target_scenes as scenes
+from held_patterns import placed_carrier
 from scipy.ndimage import gaussian_filter
 
 from calibration.targets.kinds import CarrierKind
 from calibration.targets.rendering import render
-from calibration.targets.scenes import placed_carrier
 from geometry.arrays import Floats
 from geometry.camera import Camera
 

@@ -158,7 +158,7 @@ CASES: dict[str, Case] = {
         "did you mean square_mm", same, PLATE_TOML.replace("square_mm", "sqare_mm")
     ),
     "no carriers": Case("has no targets", same, 'schema = "rigwright.targets/1"\nname = "x"\n'),
-    "no TOML": Case("is not TOML", same, PLATE_TOML.replace("[[plates]]", "[[plates]")),
+    "no TOML": Case("is not a target file", same, PLATE_TOML.replace("[[plates]]", "[[plates]")),
     "an empty folder": Case("holds no pictures", lambda folder, _: folder.mkdir()),
     "no folders of cameras": Case("no folders of cameras", loose),
 }
@@ -426,7 +426,7 @@ def test_targets_that_cannot_be_printed(folder: Path, client: TestClient) -> Non
     (folder / "design.json").write_text('{"schema": "rigwright.design/1", "cameras": []}')
     assert "; " in line("--design", "design.json")
     (folder / "wrong.toml").write_text(PLATE_TOML.replace("rows = 5", "rows = 5.5"))
-    assert "plates.0.rows cannot be used" in line("wrong.toml")
+    assert "plates[0].rows is 5.5; it should be a valid integer" in line("wrong.toml")
     answer = client.post("/v1/target-sets", json=tomllib.loads(PLATE_TOML))
     for page, words in (("A9", "no page"), ("80x80", "larger page")):
         assert words in told(client.get(answer.json()["links"]["sheets"] + f"?page={page}").json())

@@ -6,9 +6,9 @@ import functools
 from dataclasses import replace
 
 import numpy as np
+from synthetic_scenes import Scene, face_rig, face_scene, plate_places, turned
 
 from calibration.adjustment import Calibration, CalibrationOptions, calibrate
-from calibration.synthetic import Scene, face_rig, face_scene, plate_places, turned
 from geometry.arrays import Floats
 
 SIGMA_PX = 0.1

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from held_patterns import placed_carrier
 from scipy.spatial.transform import Rotation
 from simulated_rigs import lens, placed
 
 from calibration.targets.kinds import CarrierKind, CharucoPlate
 from calibration.targets.rendering import photographed, render
-from calibration.targets.scenes import placed_carrier
 from geometry.arrays import Floats
 from geometry.camera import RigCamera
 from geometry.frames import Pose

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from held_patterns import placed_carrier, true_pixels
 from scipy.spatial.transform import Rotation
 
 from calibration.detection.found import Detections
 from calibration.targets.kinds import CarrierKind, CharucoPlate, MarkerCarrier, Place, RingCarrier
 from calibration.targets.rendering import photographed, render
 from calibration.targets.ringcodes import RingCodeFamily
-from calibration.targets.scenes import placed_carrier, true_pixels
 from geometry.arrays import Floats
 from geometry.camera import Body, Camera
 

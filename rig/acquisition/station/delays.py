@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import os
-import secrets
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from common.errors import InputError
+from common.files.writing import write_whole
 from rig.acquisition.station.stationfile import parse_station
 
 
@@ -46,19 +45,12 @@ def write_timings(path: Path, timings: Mapping[str, Timing]) -> None:
 
     Raises :class:`InputError` when it cannot be read or written.
     """
-    half = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
     try:
         text = with_timings(path.read_text(encoding="utf-8"), timings, path.name)
-        with half.open("w", encoding="utf-8") as file:
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
-        half.chmod(path.stat().st_mode & 0o7777)
-        half.replace(path)
     except OSError as error:
-        half.unlink(missing_ok=True)
         raise InputError(
-            "station-unwritable",
-            f"cannot write the station file {path} ({(error.strerror or '').lower()})",
-            "make it and its folder writable",
+            "station-unreadable",
+            f"cannot read the station file {path} ({(error.strerror or '').lower()})",
+            "check the path",
         ) from error
+    write_whole(path, text.encode(), overwrite=True)
