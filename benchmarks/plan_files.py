@@ -7,8 +7,8 @@ import tempfile
 import time
 from pathlib import Path
 
+from rig.build.folder.planfolder import write_plan
 from rig.build.mounts.planfile import read_plan
-from rig.build.planfolder import write_plan
 
 
 def main(paths: list[str]) -> None:

@@ -11,16 +11,16 @@ from typing import Any
 
 import trimesh
 
+from common.files.plain import plain
 from common.progress import CancelToken, Progress, ProgressCallback
 from geometry.camera import RigCamera
 from geometry.preparation import PreparedSubject, prepare_subject
 from geometry.reading import read_scan
 from geometry.scan import Scan
 from rig.design.designfile import evaluation_document
-from rig.design.designfolder import write_design_folder
 from rig.design.layout import Layout, make_layout
+from rig.report.designfolder import write_design_folder
 from rig.specification.spec import RigSpec
-from service.wire import plain
 from solver.design import design
 from solver.quality import evaluate
 from solver.result import Design, Quality

@@ -16,7 +16,8 @@ from calibration.adjustment.result import Calibration, CalibrationQuality, Place
 from calibration.files.packing import PackedCovariance, compact, packed, unpacked
 from calibration.observations import Carrier, Distance, TargetSet
 from common.errors import InputError
-from common.files.records import model_of, plain, record_of
+from common.files.plain import plain
+from common.files.records import model_of, record_of
 from common.files.strict import StrictModel, parsed
 from common.files.writing import read_limited, write_whole
 from geometry.arrays import Floats

@@ -8,7 +8,8 @@ from typing import Any, Generic, Literal, TypeVar
 
 from pydantic import Field, create_model
 
-from common.files.records import model_of, plain, record_of
+from common.files.plain import plain
+from common.files.records import model_of, record_of
 from common.files.strict import StrictModel, parsed
 from common.files.writing import read_limited, write_whole
 

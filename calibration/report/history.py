@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from calibration.files.records import CheckRecord
-from calibration.report.svg import Series, chart
+from common.page.svg import Series, chart
 
 
 @dataclass(frozen=True)

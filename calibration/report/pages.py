@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from html import escape
-
 from calibration.adjustment.result import Calibration
 from calibration.check.verdicts import CameraCheck, CheckResult, Kind, Light
 from calibration.files.calibrationfile import CalibrationRecord
 from calibration.files.records import CheckRecord
 from calibration.report.history import History, history_svg
-from calibration.report.svg import GREEN, RED, YELLOW, Series, chart, residual_plot
+from calibration.report.residualplot import residual_plot
+from common.page.document import still_page
+from common.page.html import esc, text_table
+from common.page.svg import GREEN, RED, YELLOW, Series, chart
 
 STYLE = """
 body{font:15px/1.5 system-ui,sans-serif;color:#1f2933;max-width:1000px}
 body{margin:2rem auto;padding:0 1rem}
 h1{font-size:1.5rem}h2{font-size:1.1rem;margin-top:2rem}
-table{border-collapse:collapse;width:100%;font-variant-numeric:tabular-nums}
+.table{overflow-x:auto}table{border-collapse:collapse;width:100%;font-variant-numeric:tabular-nums}
 th,td{padding:.25rem .5rem;text-align:right;border-bottom:1px solid #e2e8ee}
 th:first-child,td:first-child{text-align:left}th{font-weight:600;vertical-align:bottom}
 .light{display:inline-block;width:1.6rem;height:1.6rem;border-radius:50%;vertical-align:middle}
@@ -24,31 +24,12 @@ th:first-child,td:first-child{text-align:left}th{font-weight:600;vertical-align:
 .plots{display:flex;flex-wrap:wrap;gap:1rem}.plots figure{width:300px;margin:0}
 figcaption,small,.note{color:#52606d;font-size:.85rem}svg{max-width:100%;height:auto}
 """
-POLICY = "default-src 'none'; style-src 'unsafe-inline'"
 COLOURS = {Light.GREEN: GREEN, Light.YELLOW: YELLOW, Light.RED: RED}
 HEADLINES = {
     Light.GREEN: "Fine: go on working",
     Light.YELLOW: "Look before you go on",
     Light.RED: "Stop: something has changed",
 }
-
-
-def page(title: str, parts: Iterable[str]) -> str:
-    """A whole document that loads nothing from anywhere."""
-    return (
-        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
-        f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">'
-        '<meta name="viewport" content="width=device-width">'
-        f"<title>{escape(title)}</title><style>{STYLE}</style></head><body>"
-        f"{''.join(parts)}</body></html>\n"
-    )
-
-
-def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """A table of texts, escaped here."""
-    cells = "".join(f"<th>{escape(h)}</th>" for h in head)
-    body = "".join("<tr>" + "".join(f"<td>{escape(c)}</td>" for c in row) + "</tr>" for row in rows)
-    return f"<table><thead><tr>{cells}</tr></thead><tbody>{body}</tbody></table>"
 
 
 def number(value: float, digits: int = 3) -> str:
@@ -66,7 +47,7 @@ def light(colour: Light) -> str:
 
 def finding(sentence: str, colour: str) -> str:
     """A sentence with a coloured edge."""
-    return f'<div class="finding" style="border-color:{colour}">{escape(sentence)}</div>'
+    return f'<div class="finding" style="border-color:{colour}">{esc(sentence)}</div>'
 
 
 def check_page(record: CheckRecord, reference: Calibration | None = None) -> str:
@@ -77,10 +58,10 @@ def check_page(record: CheckRecord, reference: Calibration | None = None) -> str
     result = record.result
     title = f"Calibration check {record.made_utc}".strip()
     parts = [
-        f"<h1>{light(result.light)} {escape(HEADLINES[result.light])}</h1>",
-        f"<p>Reference: {escape(record.reference or 'unnamed')}. {escape(record.made_utc)}</p>",
+        f"<h1>{light(result.light)} {esc(HEADLINES[result.light])}</h1>",
+        f"<p>Reference: {esc(record.reference or 'unnamed')}. {esc(record.made_utc)}</p>",
         *(finding(f.sentence, COLOURS[f.light]) for f in result.findings),
-        *(f'<p class="note">{escape(note)}</p>' for note in result.notes),
+        *(f'<p class="note">{esc(note)}</p>' for note in result.notes),
         "<h2>Cameras</h2>",
         _camera_table(result.cameras),
         f'<p class="note">Load: the pose test over its limit, an alarm above 1. Smallest: what '
@@ -99,7 +80,7 @@ def check_page(record: CheckRecord, reference: Calibration | None = None) -> str
         f"{result.scale_ppm:+.1f} ppm (sigma {result.scale_sigma_ppm:.1f}); a false alarm in "
         f"{1.0 / result.alpha:.0f} checks at most.</p>"
     )
-    return page(title, parts)
+    return still_page(title, "".join(parts), STYLE)
 
 
 def _camera_table(cameras: tuple[CameraCheck, ...]) -> str:
@@ -134,12 +115,12 @@ def _camera_table(cameras: tuple[CameraCheck, ...]) -> str:
             hidden,
         )
         rows.append((c.name, told, str(c.points), *(number(v) for v in numbers)))
-    return table(head, rows)
+    return text_table(head, rows)
 
 
 def _carrier_table(result: CheckResult) -> str:
     head = ("carrier", "verdict", "points", "rms px", "scale ppm", "sigma ppm", "worst target")
-    return table(
+    return text_table(
         head,
         (
             (
@@ -157,7 +138,7 @@ def _carrier_table(result: CheckResult) -> str:
 
 
 def _length_table(result: CheckResult) -> str:
-    return table(
+    return text_table(
         ("distance", "length mm", "error um", "sigma um", "error / sigma"),
         (
             (
@@ -227,17 +208,20 @@ def calibration_page(record: CalibrationRecord) -> str:
         for c, k in zip(quality.cameras, calibration.cameras, strict=True)
         if c.grid
     )
-    return page(
+    return still_page(
         f"Calibration {name}".strip(),
-        [
-            f"<h1>{light(colour)} {escape(told)} {escape(name)}</h1><p>{escape(made_utc)}</p>",
-            *(finding(w, YELLOW) for w in quality.warnings),
-            table(("", ""), facts),
-            "<h2>Cameras</h2>",
-            table(head, rows),
-            "<h2>Residuals over the images</h2>",
-            f'<div class="plots">{plots}</div>',
-        ],
+        "".join(
+            [
+                f"<h1>{light(colour)} {esc(told)} {esc(name)}</h1><p>{esc(made_utc)}</p>",
+                *(finding(w, YELLOW) for w in quality.warnings),
+                text_table(("", ""), facts),
+                "<h2>Cameras</h2>",
+                text_table(head, rows),
+                "<h2>Residuals over the images</h2>",
+                f'<div class="plots">{plots}</div>',
+            ]
+        ),
+        STYLE,
     )
 
 
@@ -255,14 +239,21 @@ def history_page(history: History) -> str:
             strict=True,
         )
     ]
-    return page(
+    return still_page(
         "Calibration checks over time",
-        [
-            f"<h1>Checks against {escape(history.reference or 'the reference')}</h1>",
-            history_svg(history),
-            chart(
-                history.times, effects, 0.0, "Effect at the subject", "effect at the subject, um"
-            ),
-            table(("time", "light", "rms px", "scale ppm", "sigma ppm"), rows),
-        ],
+        "".join(
+            [
+                f"<h1>Checks against {esc(history.reference or 'the reference')}</h1>",
+                history_svg(history),
+                chart(
+                    history.times,
+                    effects,
+                    0.0,
+                    "Effect at the subject",
+                    "effect at the subject, um",
+                ),
+                text_table(("time", "light", "rms px", "scale ppm", "sigma ppm"), rows),
+            ]
+        ),
+        STYLE,
     )

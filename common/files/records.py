@@ -6,7 +6,6 @@ import dataclasses
 import functools
 import math
 import types
-from enum import Enum
 from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from pydantic import BaseModel, create_model
@@ -61,17 +60,4 @@ def _value(hint: Any, value: Any) -> Any:  # noqa: ANN401 - any annotation, any 
         return tuple(_value(k, v) for k, v in zip(kinds, value, strict=True))
     if get_origin(hint) in (Union, types.UnionType) and value is not None:
         return _value(next(i for i in inner if i is not type(None)), value)
-    return value
-
-
-def plain(value: Any) -> Any:  # noqa: ANN401 - anything a record may hold
-    """Records, tuples and enums as JSON has them; numbers that are not finite as null."""
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return {f.name: plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
-    if isinstance(value, Enum):
-        return value.value
-    if isinstance(value, tuple | list):
-        return [plain(v) for v in value]
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
     return value

@@ -61,6 +61,11 @@ def table(
     return f'<div class="table {esc(css)}">{inner}</div>'
 
 
+def text_table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A table whose cells are texts, escaped here."""
+    return table([esc(cell) for cell in head], ([esc(cell) for cell in row] for row in rows))
+
+
 def section(key: str, title: str, words: str, *content: str) -> str:
     """A section of the page: heading, explaining words (HTML), then the figures."""
     lead = f'<p class="lead">{words}</p>' if words else ""

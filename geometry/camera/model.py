@@ -9,13 +9,7 @@ import numpy as np
 
 from common.errors import InputError
 from geometry.arrays import Floats, frozen
-from geometry.camera.projection import (
-    NO_DISTORTION,
-    distort,
-    fold_radius,
-    perspective,
-    undistort,
-)
+from geometry.camera.projection import NO_DISTORTION, distort, fold_radius, perspective, undistort
 from geometry.frames import Pose
 
 

@@ -7,17 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from common.files.plain import number
 from geometry.arrays import Floats
 from solver.result import ConstraintRow, Quality, SolverReport
 
 UPPER_TRIANGLE = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 """Order of a covariance in files: xx, xy, xz, yy, yz, zz."""
-
-
-def number(value: float) -> float | None:
-    """A JSON number; None for NaN and infinity, which JSON does not know."""
-    plain = float(value)
-    return plain if math.isfinite(plain) else None
 
 
 def _table(values: Floats) -> list[list[float | None]]:

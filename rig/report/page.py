@@ -5,13 +5,12 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from importlib.resources import files
-from string import Template
 from typing import TYPE_CHECKING, Any
 
-from common.page.html import esc
+from common.files.plain import number
+from common.page.document import drawn_page, style_sheet
 from geometry.scan import ScanNote
 from geometry.subject import Subject
-from rig.design.figures import number
 from rig.design.layout import Layout
 from rig.report import sections, summary
 from rig.report.ellipsoids import (
@@ -30,12 +29,6 @@ from solver.result import Design
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
-
-POLICY = (
-    "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval'; style-src 'unsafe-inline'; "
-    "img-src data: blob:; font-src data:"
-)
-"""The page loads nothing from anywhere; plotly compiles its shaders' glue, hence eval."""
 
 SMALL_HEAD_FACES = 9_000
 
@@ -65,26 +58,17 @@ def render_report(
     ``title`` and ``scan_name`` may hold anything: they are escaped. ``document.body.dataset``
     gets ``view``, a JSON summary of what is drawn, and ``ready`` once the figures stand.
     """
-    # Imported here: plotly costs a second, and only a report needs it.
-    from plotly.offline import get_plotlyjs
-
     figures = _figures(design, subject, layout)
-    return Template(_part("page.html")).substitute(
-        policy=POLICY,
-        title=esc(title),
-        style=_part("style.css"),
-        view=esc(json.dumps(_view(design, figures), allow_nan=False)),
+    return drawn_page(
+        title,
         header=summary.heading(title, scan_name, design),
         main=_main(design, subject, layout, figures, notes, scan_name),
         footer=sections.colophon(design),
-        plotly=get_plotlyjs(),
+        style=style_sheet(),
         figures=_figures_json(figures.plots),
-        script=_part("page.js"),
+        script=files("rig.report").joinpath("page.js").read_text(encoding="utf-8"),
+        view=_view(design, figures),
     )
-
-
-def _part(name: str) -> str:
-    return files("rig.report").joinpath(name).read_text(encoding="utf-8")
 
 
 def _main(
@@ -145,11 +129,10 @@ def _figures(design: Design, subject: Subject, layout: Layout) -> _Figures:
 
 
 def _figures_json(plots: dict[str, go.Figure]) -> str:
-    """The figures as JSON that may stand inside a script element, whatever names they hold."""
+    """The figures as JSON, by the key of their place."""
     parts = []
     for key, plot in plots.items():
         # The default template would double the figures with styles the page overrides.
         plot.update_layout(template="none")
         parts.append(f"{json.dumps(key)}:{plot.to_json()}")
-    text = "{" + ",".join(parts) + "}"
-    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+    return "{" + ",".join(parts) + "}"

@@ -9,6 +9,7 @@ from urllib.parse import quote
 from fastapi import APIRouter
 
 from common.errors import RigwrightError
+from common.files.plain import plain
 from rig.acquisition.cameras.base import CameraHealth
 from rig.acquisition.capture.results import RigHealth
 from rig.acquisition.station.spec import CameraPlan
@@ -18,7 +19,6 @@ from service.api.rigmodels import RigList, RigStatus
 from service.problems import problem_document
 from service.rigs.desk import RigDesk
 from service.rigs.orders import CAPTURE, TEST
-from service.wire import plain
 
 JSON = dict[str, Any]
 router = APIRouter(tags=["rigs"])

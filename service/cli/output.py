@@ -6,8 +6,8 @@ import json
 import sys
 from typing import Any
 
+from common.files.plain import plain
 from service.problems import KINDS
-from service.wire import plain
 
 JSON = dict[str, Any]
 NOT_WELL = KINDS["device"].exit_code

@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from common.files.plain import plain
 from common.progress import Progress, ProgressCallback
-from service.wire import plain
 
 Report = Callable[[dict[str, Any]], None]
 _LINE_EVERY_S = 2.0

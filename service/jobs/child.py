@@ -21,8 +21,9 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from common.errors import CancelledError, InternalError, RigwrightError, TooLargeError
+from common.files.plain import plain
 from common.progress import Progress
-from service.wire import error_fields, line, plain
+from service.wire import error_fields, line
 
 _PROGRESS_INTERVAL_S = 0.2
 

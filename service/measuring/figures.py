@@ -9,7 +9,7 @@ from calibration.adjustment import CalibratedCamera, Calibration
 from calibration.adjustment.result import CameraQuality
 from calibration.check import CheckResult
 from calibration.check.verdicts import CameraCheck, Finding
-from service.wire import plain
+from common.files.plain import plain
 
 JSON = dict[str, Any]
 

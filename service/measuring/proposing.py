@@ -9,8 +9,8 @@ import numpy as np
 
 from calibration.targets.proposing import Proposal, propose_targets
 from common.errors import InputError
+from common.files.plain import plain
 from rig.design.designfile import read_design
-from service.wire import plain
 
 JSON = dict[str, Any]
 HEAD_MM = (160.0, 200.0, 240.0)

@@ -16,10 +16,10 @@ from calibration.detection.gates import Rejection
 from calibration.detection.pictures import DetectedPictures, TakenPicture, detect_pictures
 from calibration.detection.selftest import require_opencv
 from calibration.targets.kinds import TargetPlan
+from common.files.plain import plain
 from common.progress import CancelToken, Progress, ProgressCallback
 from service.pictures.archive import unpack
 from service.pictures.listing import Picture, pictures_in_folder, pictures_in_session
-from service.wire import plain
 
 JSON = dict[str, Any]
 DETECTING = 0.85

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from common.errors import ConflictError, DeviceError, InterlockError, InternalError, RigwrightError
+from common.files.plain import plain
 from common.progress import CancelToken, Progress, ProgressCallback
 from rig.acquisition.capture.results import RigHealth
 from rig.acquisition.capture.rig import Rig, open_station
@@ -23,7 +24,6 @@ from service.jobs.manager import end_without_result
 from service.rigs.sessions import Sessions
 from service.store import Store
 from service.store.jobrecords import JobRecord, NewJob
-from service.wire import plain
 
 JSON = dict[str, Any]
 Work = Callable[[Rig, Sessions, ProgressCallback, CancelToken], JSON]

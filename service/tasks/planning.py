@@ -7,18 +7,18 @@ from pathlib import Path
 from typing import Any
 
 from common.errors import InputError
+from common.files.plain import plain
 from common.progress import CancelToken, Progress, ProgressCallback
 from geometry.preparation import prepare_subject
 from geometry.reading import read_scan
+from rig.build.folder.planfiles import PlanOptions
+from rig.build.folder.planfolder import write_plan
 from rig.build.mounts.making import make_plan
 from rig.build.mounts.plan import MountPlan
 from rig.build.mounts.systemfile import read_system, system_from_mapping
 from rig.build.parts import Prices, must_be_known
-from rig.build.planfiles import PlanOptions
-from rig.build.planfolder import write_plan
 from rig.catalogue import load_catalogue
 from rig.design.designfile import read_design
-from service.wire import plain
 
 JSON = dict[str, Any]
 Request = Mapping[str, Any]

@@ -25,7 +25,7 @@ from calibration.files import (
 )
 from calibration.files.packing import compact
 from common.errors import ConflictError, InputError
-from common.files.records import plain
+from common.files.plain import plain
 
 
 def record(name: str = "rig") -> CalibrationRecord:

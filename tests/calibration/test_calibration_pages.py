@@ -27,8 +27,8 @@ class Balanced(HTMLParser):
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         self.seen.append(tag)
-        assert not any(k in ("src", "href") for k, _ in attrs)
-        if tag not in ("meta", "line", "circle", "rect"):
+        assert all(str(v).startswith("data:") for k, v in attrs if k in ("src", "href"))
+        if tag not in ("meta", "link", "line", "circle", "rect"):
             self.open.append(tag)
 
     def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:

@@ -18,13 +18,13 @@ import httpx2
 import pytest
 from typer.testing import CliRunner
 
+from common.files.plain import plain
 from common.progress import CancelToken, Progress
 from rig.specification.examples import example_text
 from service.cli import app, running
 from service.jobs.engine import Report, Task
 from service.store import Store
 from service.store.jobrecords import JobRecord
-from service.wire import plain
 
 T = TypeVar("T")
 HERE = Path(__file__).parent

@@ -28,7 +28,7 @@ from service_helpers import (
 from starlette.testclient import TestClient
 
 from geometry.head import synthetic_head
-from rig.design.designfolder import FILE_NAMES
+from rig.report.designfolder import FILE_NAMES
 from service import work
 from service.api.app import create_app
 from service.api.context import Service

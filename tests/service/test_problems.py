@@ -10,6 +10,7 @@ from service_helpers import ROOT
 from starlette.testclient import TestClient
 
 from common import errors
+from common.files.plain import plain
 from service.api import picturesets, targetsets
 from service.api.app import make_app
 from service.kinds import KINDS as JOB_KINDS
@@ -26,7 +27,7 @@ from service.rigs.orders import RIG_KINDS
 from service.settings import PREFIX, Settings
 from service.store.blobs import Staging
 from service.store.jobs import Jobs
-from service.wire import error_fields, error_from_fields, plain
+from service.wire import error_fields, error_from_fields
 
 
 def all_errors() -> list[type[errors.RigwrightError]]:

@@ -8,12 +8,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from common.errors import ConflictError, InputError
+from common.files.plain import plain
 from geometry.camera import RigCamera
 from rig.acquisition.cameras.base import CameraInfo
 from rig.acquisition.session import places
 from rig.acquisition.session.colmap import rig_config
 from rig.acquisition.session.folder import SessionPlan
-from rig.acquisition.session.jsonfiles import json_bytes, plain
+from rig.acquisition.session.jsonfiles import json_bytes
 from rig.acquisition.session.records import SessionFile
 from rig.acquisition.session.storage import sha256
 from rig.acquisition.station.spec import Station

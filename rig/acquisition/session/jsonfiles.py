@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
-import math
-from collections.abc import Mapping
-from enum import Enum
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from common.errors import InputError
 from common.files.strict import StrictModel, validated
@@ -16,22 +12,6 @@ from rig.acquisition.session.records import FileEntry, SessionFile
 from rig.acquisition.session.storage import sha256
 
 ModelT = TypeVar("ModelT", bound=StrictModel)
-
-
-def plain(value: Any) -> Any:  # noqa: ANN401  any value in, JSON's own out
-    """JSON's own for a value: dataclasses as mappings, NaN and infinity as null."""
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        fields = dataclasses.fields(value)
-        return {field.name: plain(getattr(value, field.name)) for field in fields}
-    if isinstance(value, Enum):
-        return value.value
-    if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, tuple | list):
-        return [plain(item) for item in value]
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    return value
 
 
 def json_bytes(document: object) -> bytes:

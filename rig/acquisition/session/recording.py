@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 
-from rig.acquisition.session.jsonfiles import plain
+from common.files.plain import plain
 from rig.acquisition.session.records import CaptureRecord, FileEntry
 from rig.acquisition.synchrony.evidence import CameraTiming, FrameTiming, sync_class
 from rig.acquisition.synchrony.faults import Fault

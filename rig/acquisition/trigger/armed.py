@@ -6,10 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from rig.acquisition.trigger.box import Edge, FireOutcome, FireReport
-from rig.acquisition.trigger.client import (
-    BoxResult,
-    EdgeLog,
-)
+from rig.acquisition.trigger.client import BoxResult, EdgeLog
 from rig.acquisition.trigger.clock import ClockFit
 from rig.acquisition.trigger.edges import OUTPUTS
 from rig.acquisition.trigger.program import Program

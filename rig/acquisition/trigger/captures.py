@@ -13,17 +13,9 @@ from collections import OrderedDict
 from collections.abc import Callable
 
 from common.errors import ConflictError, DeviceError, InterlockError, RigwrightError
-from rig.acquisition.trigger.armed import (
-    ArmedCapture,
-    full_report,
-    plain_report,
-)
+from rig.acquisition.trigger.armed import ArmedCapture, full_report, plain_report
 from rig.acquisition.trigger.box import FireOutcome, TriggerState
-from rig.acquisition.trigger.client import (
-    BoxResult,
-    EdgeLog,
-    RefusedError,
-)
+from rig.acquisition.trigger.client import BoxResult, EdgeLog, RefusedError
 from rig.acquisition.trigger.connection import Connection
 from rig.acquisition.trigger.lines import ErrorCode
 from rig.acquisition.trigger.link import NoAnswerError

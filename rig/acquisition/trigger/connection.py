@@ -13,12 +13,7 @@ from dataclasses import dataclass
 
 from common.errors import DeviceError
 from rig.acquisition.trigger.box import TriggerState
-from rig.acquisition.trigger.client import (
-    BoxClient,
-    BoxStatus,
-    Identity,
-    RefusedError,
-)
+from rig.acquisition.trigger.client import BoxClient, BoxStatus, Identity, RefusedError
 from rig.acquisition.trigger.clock import ClockFit, ClockModel
 from rig.acquisition.trigger.link import NoAnswerError, RequestLink
 from rig.acquisition.trigger.metrics import Metrics, WireLog

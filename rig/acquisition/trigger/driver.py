@@ -12,17 +12,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from common.errors import DeviceError
-from rig.acquisition.trigger.armed import (
-    known_report,
-    stranger_report,
-)
+from rig.acquisition.trigger.armed import known_report, stranger_report
 from rig.acquisition.trigger.box import ArmRequest, FireReport, TriggerCapabilities, TriggerHealth
 from rig.acquisition.trigger.captures import Captures
 from rig.acquisition.trigger.clock import ClockModel
-from rig.acquisition.trigger.connection import (
-    BoxView,
-    Connection,
-)
+from rig.acquisition.trigger.connection import BoxView, Connection
 from rig.acquisition.trigger.jobs import PATIENCE_S, JobQueue
 from rig.acquisition.trigger.metrics import Metrics, WireLog, WireTape
 from rig.acquisition.trigger.owner import PROBE_S, PortOwner

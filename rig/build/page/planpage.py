@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from importlib.resources import files
-from string import Template
 from typing import Any
 
 from geometry.raycast import Occluder
@@ -16,7 +15,7 @@ from rig.build.drawings.figures import (
 )
 from rig.build.drawings.steps import plain_steps
 from rig.build.drawings.views import plan_solids
-from rig.design.figures import number
+from common.files.plain import number
 from rig.build.mounts.plan import MountPlan
 from rig.build.mounts.settings import CameraMount
 from rig.build.parts.bill import Bill
@@ -30,7 +29,7 @@ from common.page.html import (
     section,
     table,
 )
-from rig.report.page import POLICY
+from common.page.document import drawn_page, style_sheet
 from rig.build.page.planview import plan_figure
 
 FIGURE = "plan-3d"
@@ -52,9 +51,6 @@ def render_plan_page(
     Names may hold anything: they are escaped. ``document.body.dataset`` gets ``view``, a JSON
     summary of what is drawn, and ``ready`` once the figure stands.
     """
-    # Imported here: plotly costs a second, and only a report needs it.
-    from plotly.offline import get_plotlyjs
-
     solids = plan_solids(plan)
     figure, ways = plan_figure(plan, solids, occluder)
     figure.update_layout(template="none")
@@ -66,29 +62,21 @@ def render_plan_page(
         "parts": sum(line.quantity for line in bill.lines),
         "sigma_median_mm": number(plan.price.built.sigma_median_mm),
     }
-    return Template(_part("page.html")).substitute(
-        policy=POLICY,
-        title=esc(plan.name),
-        style=_part("style.css") + _part("plan.css"),
-        view=esc(json.dumps(view, allow_nan=False)),
+    return drawn_page(
+        plan.name,
         header=_heading(plan),
         main=_main(plan, bill, cuts),
         footer="<p>Rig frame: millimetres, X to the subject's left, Y from the cameras towards "
         "the subject, Z up. σ is one standard deviation.</p>",
-        plotly=get_plotlyjs(),
-        figures=_safe(json.dumps(parts, allow_nan=False)),
+        style=style_sheet() + _part("plan.css"),
+        figures=json.dumps(parts, allow_nan=False),
         script=_part("plan.js"),
+        view=view,
     )
 
 
 def _part(name: str) -> str:
-    folder = files("rig.build.page" if name.startswith("plan.") else "rig.report")
-    return folder.joinpath(name).read_text(encoding="utf-8")
-
-
-def _safe(text: str) -> str:
-    """JSON that may stand inside a script element."""
-    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+    return files("rig.build.page").joinpath(name).read_text(encoding="utf-8")
 
 
 def _heading(plan: MountPlan) -> str:

@@ -9,13 +9,13 @@ import uuid
 import zipfile
 from typing import TYPE_CHECKING
 
+from common.files.zip import zip_bytes
 from rig.build.wedges.recipe import PrintPart
 from rig.build.wedges.solid import bracket_mesh
 
 if TYPE_CHECKING:
     import trimesh
 
-ZIP_TIME = (1980, 1, 1, 0, 0, 0)
 UUID = re.compile(rb'UUID="[0-9a-f-]{36}"')
 
 
@@ -41,16 +41,13 @@ def bracket_3mf(part: PrintPart, mesh: trimesh.Trimesh | None = None) -> bytes:
 
 def _same_each_time(package: bytes) -> bytes:
     """The package with identifiers that follow from its content instead of from chance."""
-    stream = io.BytesIO()
-    with (
-        zipfile.ZipFile(io.BytesIO(package)) as given,
-        zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive,
-    ):
-        for entry in given.infolist():
-            counted = itertools.count()
-            content = UUID.sub(
-                lambda _: b'UUID="%s"' % str(uuid.UUID(int=next(counted) + 1)).encode(),  # noqa: B023
-                given.read(entry),
-            )
-            archive.writestr(zipfile.ZipInfo(entry.filename, ZIP_TIME), content)
-    return stream.getvalue()
+    with zipfile.ZipFile(io.BytesIO(package)) as given:
+        return zip_bytes({e.filename: _numbered(given.read(e)) for e in given.infolist()})
+
+
+def _numbered(content: bytes) -> bytes:
+    """A file of the package whose identifiers are counted from 1."""
+    counted = itertools.count(1)
+    return UUID.sub(
+        lambda _: b'UUID="%s"' % str(uuid.UUID(int=next(counted))).encode(), content
+    )

@@ -13,14 +13,14 @@ import pytest
 from common.errors import ConflictError, InputError
 from geometry.preparation import PreparedSubject
 from geometry.subject import Subject
-from rig.design.designfolder import (
+from rig.design.layout import Layout, make_layout
+from rig.report.designfolder import (
     FILE_NAMES,
     MEDIA_TYPES,
     check_design_folder,
     points_csv,
     write_design_folder,
 )
-from rig.design.layout import Layout, make_layout
 from rig.specification.examples import example_rig
 from solver.result import Design
 

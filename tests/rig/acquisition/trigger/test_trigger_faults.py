@@ -26,13 +26,8 @@ from trigger_boxes import (
 )
 
 from common.errors import ConflictError, DeviceError, RigwrightError
-from rig.acquisition.trigger import (
-    connection as connection,
-)
-from rig.acquisition.trigger import (
-    link,
-    owner,
-)
+from rig.acquisition.trigger import connection as connection
+from rig.acquisition.trigger import link, owner
 from rig.acquisition.trigger.box import FireOutcome, TriggerState
 from rig.acquisition.trigger.driver import BoxAddress, SerialTriggerBox
 from rig.acquisition.trigger.endpoint import PtyEndpoint, TcpEndpoint

@@ -12,7 +12,7 @@ from common.files.folders import (
     whole_folder,
 )
 from rig.build.mounts.plan import MountPlan
-from rig.build.planfiles import (
+from rig.build.folder.planfiles import (
     PlanFile,
     PlanOptions,
     plan_files,

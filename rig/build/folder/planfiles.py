@@ -16,11 +16,11 @@ from rig.build import (
 )
 from rig.catalogue import Catalogue, load_catalogue
 from rig.build.drawings import Sheet
-from rig.design.designfolder import json_text
+from rig.report.designfolder import json_text
 from rig.build.mounts.plan import MountPlan
 from rig.build.mounts.planfile import plan_document
 from rig.build.mounts.structure import Plate
-from rig.build.planscene import plan_glb
+from rig.build.page.planscene import plan_glb
 
 if TYPE_CHECKING:
     import trimesh
