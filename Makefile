@@ -51,8 +51,9 @@ format: $(STAMP)
 	$(BIN)/ruff format .
 
 docs: $(STAMP)
-	$(BIN)/python -m service.reference.schemas docs
-	$(BIN)/python -m service.reference.openapi docs/openapi.json
+	$(BIN)/python -m service.reference.schemas docs/reference
+	$(BIN)/python -m service.reference.openapi docs/reference/openapi.json
+	$(BIN)/python -m service.reference.house docs/explanation
 
 benchmarks: $(STAMP)
 	$(BIN)/python -m benchmarks.speed
@@ -60,7 +61,7 @@ benchmarks: $(STAMP)
 	$(BIN)/python -m benchmarks.fires --fires 10000 --seed 1
 	$(BIN)/python -m benchmarks.crashes --times 200 --seed 1
 	$(BIN)/python -m benchmarks.rendering
-	$(BIN)/python -m benchmarks.firmware --out docs/trigger-timing.md
+	$(BIN)/python -m benchmarks.firmware --out docs/explanation/trigger-timing.md
 
 clean:
 	rm -rf $(VENV) out build dist *.egg-info

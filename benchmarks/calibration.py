@@ -1,6 +1,7 @@
 """How good calibrations and their stated uncertainties are, by simulation, and how fast.
 
-    python -m benchmarks.calibration [--draws 1000] [--processes 1] [--write docs/calibration.md]
+    python -m benchmarks.calibration [--draws 1000] [--processes 1]
+        [--write docs/explanation/calibration.md]
 
 Fixed seeds. A thousand draws take ten minutes of one core; ``--draws 0`` measures speed alone.
 """

@@ -1,6 +1,6 @@
 """How exactly and how fast targets are found, beside plain OpenCV on the same pictures.
 
-    python -m benchmarks.detection [--out docs/targets.md]
+    python -m benchmarks.detection [--out docs/how-to/targets.md]
 
 Rendered pictures of 1200 x 900 pixels: blur 0.5 to 1.5 px (sigma, the pixel's own comes on top),
 noise of 2 grey levels of 255, black at 30 and white at 220, tilt 0 to 60 degrees, with and without

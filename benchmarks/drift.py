@@ -1,7 +1,7 @@
 """What the check sees of a disturbed rig, and how often it alarms without reason, by simulation.
 
     python -m benchmarks.drift [--trials 1000] [--nothing 5000] [--processes 1]
-        [--write docs/calibration.md]
+        [--write docs/explanation/calibration.md]
 
 Fixed seeds, the same figures with any number of processes. About half an hour of one core.
 """

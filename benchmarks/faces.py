@@ -1,6 +1,7 @@
 """Designs for 4 to 9 cameras on a head, beside their start and the best strip.
 
-    python -m benchmarks.faces [--scan HEAD.glb] [--starts 8] [--out docs/face-designs.md]
+    python -m benchmarks.faces [--scan HEAD.glb] [--starts 8]
+        [--out docs/explanation/face-designs.md]
 
 Without a scan the bundled head is used. The limits are those of the example face rig.
 """
@@ -85,7 +86,8 @@ def main() -> None:
             "# Designs for 4 to 9 cameras\n\n"
             f"Head: {name}. Limits: `rig/specification/data/face.toml`, {chosen.starts} starts. "
             f"{len(prepared.subject.check_points)} check points.\n"
-            "Written by `python -m benchmarks.faces --scan HEAD --out docs/face-designs.md`.\n"
+            "Written by `python -m benchmarks.faces --scan HEAD "
+            "--out docs/explanation/face-designs.md`.\n"
             "Sigma is the longest semi-axis of a point's error ellipsoid at half a pixel of "
             "image noise.\n\n"
         )  # fmt: skip

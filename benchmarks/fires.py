@@ -2,7 +2,8 @@
 
 ``python -m benchmarks.fires --fires 10000 --seed 1`` fires fake boxes through fault proxies,
 counts the pulses that were really made at the outputs (not what any log says) and compares
-them with what the driver reported. ``--write docs/trigger.md`` puts the table into the docs.
+them with what the driver reported. ``--write docs/explanation/trigger.md`` puts the table into
+the docs.
 """
 
 from __future__ import annotations

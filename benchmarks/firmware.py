@@ -1,6 +1,6 @@
 """When the trigger box's pulses come, in the firmware that is flashed, on two simulators.
 
-    python -m benchmarks.firmware [--out docs/trigger-timing.md]
+    python -m benchmarks.firmware [--out docs/explanation/trigger-timing.md]
 
 Needs avr-gcc; simavr (libsimavr-dev), or node and npm for avr8js. What is not installed is left
 out and said so. Every figure is counted in processor cycles from a log of all changes of all 16
@@ -29,8 +29,8 @@ LONG = Burst({1: (0, 16_000_000), 12: (60_000_000, 200), 13: (30_000_001, 200_00
 
 HEAD = """# When the pulses come
 
-Made by `python -m benchmarks.firmware --out docs/trigger-timing.md`, with the firmware of
-`rig/firmware/` as it is flashed.
+Made by `python -m benchmarks.firmware --out docs/explanation/trigger-timing.md`, with the
+firmware of `rig/firmware/` as it is flashed.
 
 **Simulators are not hardware.** simavr and avr8js play the processor cycle by cycle. What they
 cannot show: the board's resonator (up to 0.5 % off on an Uno; the host measures it), the

@@ -1,6 +1,7 @@
 """Mount plans of the 4- to 9-camera face designs on a frame, a plate and an arc; a hundred cameras.
 
-    python -m benchmarks.plans --designs FOLDER [--scan HEAD.glb] [--out docs/mount-plans.md]
+    python -m benchmarks.plans --designs FOLDER [--scan HEAD.glb]
+        [--out docs/explanation/mount-plans.md]
 
 FOLDER keeps the designs as faces-4.json to faces-9.json; those that are missing are designed
 first as ``benchmarks.faces`` does and written there. Run with OMP_NUM_THREADS=1: the seconds are
@@ -140,7 +141,8 @@ INTRODUCTION = """# Mount plans of the face designs
 
 Head: {name}. Designs and limits as in `face-designs.md`; every system with its defaults
 (`kind` alone): a ball head set in whole degrees, slides in whole millimetres.
-Written by `python -m benchmarks.plans --designs FOLDER --scan HEAD --out docs/mount-plans.md`.
+Written by
+`python -m benchmarks.plans --designs FOLDER --scan HEAD --out docs/explanation/mount-plans.md`.
 
 *Rounded one by one* is what a builder gets who rounds the design's figures; *built* is what the
 plan says to set. *Loss of coverage* is the share of the region that lost its second view.

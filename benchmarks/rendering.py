@@ -1,7 +1,7 @@
 """How fast simulated pictures are rendered, and in how much memory, beside a naive cast.
 
     python -m benchmarks.rendering [--scan head.glb --texture colour.jpg --displacement height.jpg
-                                    --flip-texture] [--out docs/rendering.md]
+                                    --flip-texture] [--out docs/explanation/rendering.md]
     python -m benchmarks.rendering --picture docs/pictures/simulated.jpg
 
 Seven cameras of 2000 x 1500 pixels about a head, 8 bits RGB, with depth of field and noise, each
@@ -42,8 +42,9 @@ LIMIT_GIB = 1.0
 _HEADING = """\
 # Speed of the simulated cameras
 
-Command: `python -m benchmarks.rendering --out docs/rendering.md` (with `--scan`, `--texture` and
-`--displacement` for a scan). Seven cameras of 2000 x 1500 pixels, RGB, 8 bits, 26 degrees across,
+Command: `python -m benchmarks.rendering --out docs/explanation/rendering.md` (with `--scan`,
+`--texture` and `--displacement` for a scan).
+Seven cameras of 2000 x 1500 pixels, RGB, 8 bits, 26 degrees across,
 0.9 m away; seconds of one core. "Ours" is the whole picture: light and soft shadow, grain, smoothed
 edges, depth of field, lens, noise, coding. "Naive" casts one ray per pixel, the whole picture at
 once, with one light and no more.

@@ -1,6 +1,6 @@
 """How fast a start is solved, beside two rivals on the same programme.
 
-    python -m benchmarks.speed [--rivals] [--out docs/benchmarks.md]
+    python -m benchmarks.speed [--rivals] [--out docs/explanation/benchmarks.md]
 
 One core. The programme is a start of a face rig with the seen rays held fixed: what our solver,
 SciPy's SLSQP with finite differences, and CasADi's IPOPT with exact Hessians can all be given.
@@ -220,7 +220,8 @@ def main() -> None:
     if chosen.out:
         head = (
             "# Speed\n\n"
-            "Written by `python -m benchmarks.speed --rivals --out docs/benchmarks.md`.\n"
+            "Written by `python -m benchmarks.speed --rivals "
+            "--out docs/explanation/benchmarks.md`.\n"
             f"One core. A rival is stopped after {RIVAL_TIME_S:.0f} s.\n\n"
         )
         chosen.out.write_text(head + text)

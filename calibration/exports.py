@@ -1,7 +1,7 @@
 """Calibrated cameras for other programs: as the rig's cameras, which ``geometry.exchange`` writes.
 
-``export_files("colmap-text", rig_cameras(calibration.cameras))``; ``docs/exports.md`` lists the
-formats.
+``export_files("colmap-text", rig_cameras(calibration.cameras))``; ``docs/how-to/exports.md`` lists
+the formats.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 ``export_files("colmap-text", cameras)`` gives file contents by name, ``write_export`` puts them in
 a folder, ``FORMATS`` lists what there is. The cameras are :class:`geometry.camera.RigCamera`,
-designed or calibrated; ``docs/exports.md`` states what each program expects.
+designed or calibrated; ``docs/how-to/exports.md`` states what each program expects.
 """
 
 from geometry.exchange.base import ExportOptions, Format, image_name, image_stem

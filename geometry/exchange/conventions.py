@@ -1,8 +1,8 @@
 """Conversions between Rigwright's conventions and those of other programs.
 
 Rigwright: millimetres, camera axes x right, y down, z forward, ``x_camera = R (X - C)``, pixel
-centres at integers. ``docs/exports.md`` lists what each program expects; every difference is one
-of the functions here.
+centres at integers. ``docs/how-to/exports.md`` lists what each program expects; every difference is
+one of the functions here.
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
 """What stands in a catalogue file: its pydantic models.
 
-``docs/catalogue.md`` lists the keys, ``docs/catalogue.schema.json`` is generated from here.
+``docs/reference/catalogue.md`` lists the keys, ``docs/reference/catalogue.schema.json`` is
+generated from here.
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
 """What stands in a design file: its pydantic models, nothing else.
 
-``docs/design.schema.json`` is generated from them and ``docs/design-file.md`` explains it.
+``docs/reference/design.schema.json`` is generated from them and
+``docs/reference/design-file.md`` explains it.
 Numbers that have no value (a far limit of sharpness at infinity, the figures of a camera that
 sees nothing) are null: JSON knows neither NaN nor infinity.
 """

@@ -1,6 +1,6 @@
 /* The board: which pin is which output, and what the box can do.
  *
- * Outputs are numbered as in docs/trigger-protocol.md, from 1; bit 0 of a 16-bit mask is output 1.
+ * Outputs are numbered as in docs/reference/trigger-protocol.md, from 1; bit 0 of a 16-bit mask is output 1.
  *   1 to 6   PORTC0-5   Arduino A0-A5
  *   7 to 12  PORTD2-7   Arduino 2-7
  *   13, 14   PORTB0-1   Arduino 8, 9     strobes

@@ -1,4 +1,4 @@
-/* The errors of docs/trigger-protocol.md, and the queue that SYST:ERR? empties. */
+/* The errors of docs/reference/trigger-protocol.md, and the queue that SYST:ERR? empties. */
 #ifndef ERRORS_H
 #define ERRORS_H
 

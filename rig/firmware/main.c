@@ -1,4 +1,4 @@
-/* The trigger box: see docs/trigger-protocol.md for what it does, README.md for its wiring. */
+/* The trigger box: see docs/reference/trigger-protocol.md for what it does, README.md for its wiring. */
 #include <avr/interrupt.h>
 #include <avr/sleep.h>
 #include <avr/wdt.h>

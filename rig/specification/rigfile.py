@@ -1,6 +1,6 @@
 """The rig file: what a rig is made of and what it must respect, as a person writes it.
 
-TOML in files, the same structure as JSON over HTTP. ``docs/rig-file.md`` lists the keys.
+TOML in files, the same structure as JSON over HTTP. ``docs/reference/rig-file.md`` lists the keys.
 """
 
 from __future__ import annotations

@@ -53,7 +53,7 @@ class CheckRequest(Model):
 
 
 class FindingEntry(Model):
-    """One thing that a check found. ``docs/calibration.md`` lists the kinds."""
+    """One thing that a check found. ``docs/explanation/calibration.md`` lists the kinds."""
 
     kind: Kind
     light: Light

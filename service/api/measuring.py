@@ -52,7 +52,7 @@ class CameraPictures(Model):
 
 
 class RuleCount(Model):
-    """How many targets were seen and not used, by one rule of ``docs/targets.md``."""
+    """How many targets were seen and not used, by one rule of ``docs/how-to/targets.md``."""
 
     rule: str
     count: int

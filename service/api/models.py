@@ -60,7 +60,7 @@ class Fault(Model):
 
 
 class Problem(Model):
-    """An error, as RFC 9457 has it. ``type`` is stable; ``docs/api.md`` lists them."""
+    """An error, as RFC 9457 has it. ``type`` is stable; ``docs/how-to/api.md`` lists them."""
 
     type: str
     title: str

@@ -1,4 +1,7 @@
-"""Writes the API's document: ``python -m service.reference.openapi docs/openapi.json``."""
+"""Writes the API's document.
+
+``python -m service.reference.openapi docs/reference/openapi.json``
+"""
 
 from __future__ import annotations
 

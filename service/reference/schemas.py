@@ -1,8 +1,8 @@
 """JSON schemas and key tables of the files, generated from the models that read them.
 
-``python -m service.reference.schemas DOCS`` writes the schemas of rig files, design files,
-stations, sessions, captures, catalogues, mounts and plans to the folder DOCS and renews the
-tables between the marks in ``rig-file.md``, ``design-file.md``, ``station-file.md``,
+``python -m service.reference.schemas FOLDER`` writes the schemas of rig files, design files,
+stations, sessions, captures, catalogues, mounts and plans to FOLDER (``docs/reference``) and renews
+the tables between the marks in ``rig-file.md``, ``design-file.md``, ``station-file.md``,
 ``catalogue.md`` and ``mounts.md``.
 """
 
@@ -101,20 +101,20 @@ def with_key_table(text: str, model: type[BaseModel]) -> str:
     return re.sub(f"{BEGIN}.*?{END}", lambda _: block, text, flags=re.DOTALL)
 
 
-def documents(docs: Path) -> dict[Path, str]:
-    """What each generated file in the folder ``docs`` should hold."""
-    rig_file, design_file = docs / "rig-file.md", docs / "design-file.md"
-    station_file, parts_file = docs / "station-file.md", docs / "catalogue.md"
-    mounts = docs / "mounts.md"
+def documents(folder: Path) -> dict[Path, str]:
+    """What each generated file in the folder ``folder`` should hold."""
+    rig_file, design_file = folder / "rig-file.md", folder / "design-file.md"
+    station_file, parts_file = folder / "station-file.md", folder / "catalogue.md"
+    mounts = folder / "mounts.md"
     return {
-        docs / "rig.schema.json": schema_text(RigFile, "Rigwright rig file"),
-        docs / "design.schema.json": schema_text(DesignFile, "Rigwright design file"),
-        docs / "station.schema.json": schema_text(StationFile, "Rigwright station file"),
-        docs / "session.schema.json": schema_text(SessionFile, "Rigwright session"),
-        docs / "capture.schema.json": schema_text(CaptureRecord, "Rigwright capture"),
-        docs / "catalogue.schema.json": schema_text(CatalogueFile, "Rigwright catalogue file"),
-        docs / "mount.schema.json": schema_text(SystemFile, "Rigwright mount file"),
-        docs / "plan.schema.json": schema_text(PlanFile, "Rigwright mount plan"),
+        folder / "rig.schema.json": schema_text(RigFile, "Rigwright rig file"),
+        folder / "design.schema.json": schema_text(DesignFile, "Rigwright design file"),
+        folder / "station.schema.json": schema_text(StationFile, "Rigwright station file"),
+        folder / "session.schema.json": schema_text(SessionFile, "Rigwright session"),
+        folder / "capture.schema.json": schema_text(CaptureRecord, "Rigwright capture"),
+        folder / "catalogue.schema.json": schema_text(CatalogueFile, "Rigwright catalogue file"),
+        folder / "mount.schema.json": schema_text(SystemFile, "Rigwright mount file"),
+        folder / "plan.schema.json": schema_text(PlanFile, "Rigwright mount plan"),
         station_file: with_key_table(station_file.read_text(encoding="utf-8"), StationFile),
         rig_file: with_key_table(rig_file.read_text(encoding="utf-8"), RigFile),
         design_file: with_key_table(design_file.read_text(encoding="utf-8"), DesignFile),
@@ -123,11 +123,11 @@ def documents(docs: Path) -> dict[Path, str]:
     }
 
 
-def main(docs: Path) -> None:
+def main(folder: Path) -> None:
     """Write the generated files."""
-    for path, text in documents(docs).items():
+    for path, text in documents(folder).items():
         path.write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "docs"))
+    main(Path(sys.argv[1] if len(sys.argv) > 1 else "docs/reference"))

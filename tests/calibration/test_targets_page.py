@@ -8,7 +8,7 @@ from pathlib import Path
 from calibration.detection.gates import Rule
 from calibration.targets.files import targets_from
 
-PAGE = (Path(__file__).resolve().parents[2] / "docs" / "targets.md").read_text("utf-8")
+PAGE = (Path(__file__).resolve().parents[2] / "docs" / "how-to" / "targets.md").read_text("utf-8")
 
 
 def test_the_page_lists_the_rules_as_they_are() -> None:

@@ -22,20 +22,18 @@ from solver.result import Design
 
 
 def test_generated_documents_are_up_to_date(repo: Path) -> None:
-    for path, text in documents(repo / "docs").items():
-        assert path.read_text(encoding="utf-8") == text, (
-            f"run: python -m service.reference.schemas ({path.name})"
-        )
+    for path, text in documents(repo / "docs" / "reference").items():
+        assert path.read_text(encoding="utf-8") == text, f"run: make docs ({path.name})"
 
 
 def test_the_command_writes_them(repo: Path, tmp_path: Path) -> None:
     pages = ("rig-file.md", "design-file.md", "station-file.md", "catalogue.md", "mounts.md")
     for name in pages:
-        text = (repo / "docs" / name).read_text(encoding="utf-8")
+        text = (repo / "docs" / "reference" / name).read_text(encoding="utf-8")
         (tmp_path / name).write_text(text.replace("| `seed` |", "| `sead` |"), encoding="utf-8")
     main(tmp_path)
     for name in (path.name for path in documents(tmp_path)):
-        assert (tmp_path / name).read_text() == (repo / "docs" / name).read_text()
+        assert (tmp_path / name).read_text() == (repo / "docs" / "reference" / name).read_text()
 
 
 @pytest.mark.parametrize(
@@ -48,7 +46,7 @@ def test_the_command_writes_them(repo: Path, tmp_path: Path) -> None:
     ],
 )
 def test_every_key_is_documented(repo: Path, document: str, model: type) -> None:
-    text = (repo / "docs" / document).read_text(encoding="utf-8")
+    text = (repo / "docs" / "reference" / document).read_text(encoding="utf-8")
     told = list(keys(model))
     assert len(told) > 50
     for key, _, words in told:
@@ -57,7 +55,7 @@ def test_every_key_is_documented(repo: Path, document: str, model: type) -> None
 
 
 def test_examples_follow_the_rig_schema(repo: Path) -> None:
-    schema = json.loads((repo / "docs/rig.schema.json").read_text())
+    schema = json.loads((repo / "docs/reference/rig.schema.json").read_text())
     jsonschema.Draft202012Validator.check_schema(schema)
     for name in ("face", "wall"):
         data = tomllib.loads((repo / f"examples/{name}/rig.toml").read_text())
@@ -67,13 +65,13 @@ def test_examples_follow_the_rig_schema(repo: Path) -> None:
 
 
 def test_mounts_and_plans_follow_their_schemas(repo: Path) -> None:
-    schema = json.loads((repo / "docs/mount.schema.json").read_text())
+    schema = json.loads((repo / "docs/reference/mount.schema.json").read_text())
     jsonschema.Draft202012Validator.check_schema(schema)
     for path in sorted((repo / "examples/mounts").glob("*.toml")):
         jsonschema.validate(tomllib.loads(path.read_text()), schema)
     with pytest.raises(jsonschema.ValidationError, match="t-slut"):
         jsonschema.validate({"kind": "t-slut"}, schema)
-    schema = json.loads((repo / "docs/plan.schema.json").read_text())
+    schema = json.loads((repo / "docs/reference/plan.schema.json").read_text())
     jsonschema.Draft202012Validator.check_schema(schema)
     document = json.loads(json.dumps(plan_document(plate_plan()), allow_nan=False))
     jsonschema.validate(document, schema)
@@ -82,7 +80,7 @@ def test_mounts_and_plans_follow_their_schemas(repo: Path) -> None:
 
 
 def test_what_is_written_follows_the_design_schema(repo: Path, design: Design) -> None:
-    schema = json.loads((repo / "docs/design.schema.json").read_text())
+    schema = json.loads((repo / "docs/reference/design.schema.json").read_text())
     jsonschema.Draft202012Validator.check_schema(schema)
     document = json.loads(
         json.dumps(design_document(design, spec=example_rig("face")), allow_nan=False)
@@ -91,7 +89,7 @@ def test_what_is_written_follows_the_design_schema(repo: Path, design: Design) -
 
 
 def test_the_rig_file_in_the_document_is_a_rig_file(repo: Path) -> None:
-    text = (repo / "docs/rig-file.md").read_text(encoding="utf-8")
+    text = (repo / "docs/reference/rig-file.md").read_text(encoding="utf-8")
     first = text.split("```toml\n")[1].split("```")[0]
     assert parse_rig(first).count == 7
     parts = text.split("```toml\n")[2].split("```")[0]
@@ -105,13 +103,13 @@ def test_the_rig_file_in_the_document_is_a_rig_file(repo: Path) -> None:
 
 
 def test_the_station_file_in_the_document_is_a_station_file(repo: Path) -> None:
-    text = (repo / "docs/station-file.md").read_text(encoding="utf-8")
+    text = (repo / "docs/reference/station-file.md").read_text(encoding="utf-8")
     station = parse_station(text.split("```toml\n")[1].split("```")[0])
     assert len(station.cameras) == 2 and station.trigger is not None
 
 
 def test_the_example_station_follows_its_schema(repo: Path) -> None:
-    schema = json.loads((repo / "docs/station.schema.json").read_text())
+    schema = json.loads((repo / "docs/reference/station.schema.json").read_text())
     jsonschema.Draft202012Validator.check_schema(schema)
     data = tomllib.loads((repo / "examples/station/station.toml").read_text())
     jsonschema.validate(data, schema)

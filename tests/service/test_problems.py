@@ -160,7 +160,7 @@ def test_log_lines_are_json_with_the_job() -> None:
     assert (entry["message"], entry["job_id"], entry["seconds"]) == ("a\nline", "job-1", 1.5)
 
 
-GUIDE = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
+GUIDE = (ROOT / "docs" / "how-to" / "api.md").read_text(encoding="utf-8")
 
 
 def codes_in_the_code(package: str = "service") -> set[str]:

@@ -17,7 +17,7 @@ from solver.nlp.working_program import WorkingProgram
 from solver.outer_loop import candidate_constraints, covariance_cost, unknown_bounds
 from solver.problem import Problem
 
-# The promise of agreement in docs/decisions: one part in a thousand of the cost.
+# The promise of agreement in docs/explanation/decisions: one part in a thousand of the cost.
 AGREE = 1e-3
 
 

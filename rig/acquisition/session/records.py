@@ -1,8 +1,8 @@
 """What stands in a session's JSON files: pydantic models, nothing else.
 
-``docs/session.schema.json`` and ``docs/capture.schema.json`` are generated from them. Numbers
-that are not known are null. Instants of the host's monotonic clock (``*_host_ns``) compare only
-within one capture; ``fired_at`` is wall-clock time.
+``docs/reference/session.schema.json`` and ``docs/reference/capture.schema.json`` are generated
+from them. Numbers that are not known are null. Instants of the host's monotonic clock
+(``*_host_ns``) compare only within one capture; ``fired_at`` is wall-clock time.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class VerdictEntry(StrictModel):
 class FaultEntry(StrictModel):
     """One thing that went wrong."""
 
-    kind: str = Field(description="Its name, as in `docs/capture.md`.")
+    kind: str = Field(description="Its name, as in `docs/explanation/capture.md`.")
     text: str = Field(description="What happened, in a sentence.")
     camera: str | None = Field(description="Whose picture; null: nobody's.")
     shot: int | None = Field(description="Which shot, from 1; null: none in particular.")

@@ -1,6 +1,7 @@
 """The station file: which devices stand on the bench, as a person writes it.
 
-TOML in files, the same structure as JSON over HTTP. ``docs/station-file.md`` lists the keys.
+TOML in files, the same structure as JSON over HTTP. ``docs/reference/station-file.md`` lists the
+keys.
 """
 
 from __future__ import annotations
@@ -57,12 +58,12 @@ class StationFile(StrictModel):
     backend: dict[str, dict[str, Any]] = Field(
         default_factory=dict,
         description="Options of a backend, in a table named after it: `[backend.genicam]`. Which "
-        "there are stands in `docs/cameras.md`.",
+        "there are stands in `docs/how-to/cameras.md`.",
     )
     simulation: dict[str, Any] | None = Field(
         default=None,
         description="What the simulated cameras see and how they fail. Which keys there are stands "
-        "in `docs/simulation.md`; they are checked when the station is opened.",
+        "in `docs/explanation/simulation.md`; they are checked when the station is opened.",
     )
 
     def to_station(self, folder: Path | None = None) -> Station:

@@ -18,7 +18,7 @@ from rig.acquisition.synchrony.shooting import CameraPart, Shooting
 from rig.acquisition.synchrony.take import Pair
 
 PTP_UNCERTAINTY_US = 10.0
-"""What is claimed for PTP among cameras that do not say more (docs/capture.md)."""
+"""What is claimed for PTP among cameras that do not say more (docs/explanation/capture.md)."""
 
 
 class SyncClass(StrEnum):

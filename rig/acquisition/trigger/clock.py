@@ -6,7 +6,7 @@ passes between all those bounds. The line taken is the one midway between the ti
 them; the room left around it is the uncertainty. The bounds are tightest where one
 direction's delay was smallest, each direction by itself: it is a minimum filter on both ways,
 better than one on the round trip, which needs both ways to be quick at once. The derivation is
-in ``docs/trigger.md``.
+in ``docs/explanation/trigger.md``.
 
 Works for any clock that can be asked: a trigger box's or a camera's.
 """

@@ -55,8 +55,8 @@ class BoxAddress:
 class SerialTriggerBox:
     """A :class:`~rig.acquisition.trigger.box.TriggerBox` that speaks the protocol of this project.
 
-    ``wire_log`` hears every line sent and received. See ``docs/trigger.md`` for what it does on
-    each fault.
+    ``wire_log`` hears every line sent and received. See ``docs/explanation/trigger.md`` for what it
+    does on each fault.
     """
 
     def __init__(self, address: BoxAddress, wire_log: WireLog | None = None) -> None:

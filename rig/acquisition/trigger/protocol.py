@@ -1,7 +1,7 @@
 """What the lines of the trigger protocol say: requests, replies, events.
 
-Pure: text in, values out; no port, no clock. ``docs/trigger-protocol.md`` is the reference,
-``vectors.json`` the examples that firmware, fake and driver all pass.
+Pure: text in, values out; no port, no clock. ``docs/reference/trigger-protocol.md`` is the
+reference, ``vectors.json`` the examples that firmware, fake and driver all pass.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The system file: which mount to plan, as a person writes it.
 
-``docs/mounts.md`` lists the keys. ``kind`` alone is enough.
+``docs/reference/mounts.md`` lists the keys. ``kind`` alone is enough.
 """
 
 from __future__ import annotations

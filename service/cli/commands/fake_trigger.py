@@ -30,7 +30,7 @@ def fake_trigger(
     serial_number: Annotated[str, typer.Option(help="What it calls itself.")] = "fake",
     seed: Annotated[int, typer.Option(min=0, help="Seed of its faults.")] = 0,
     faults: Annotated[
-        str, typer.Option(help="Faults and their rates; docs/trigger.md lists them.")
+        str, typer.Option(help="Faults and their rates; docs/explanation/trigger.md lists them.")
     ] = "",
     drift_ppm: Annotated[float, typer.Option(help="How much too fast its clock runs.")] = 0.0,
 ) -> None:

@@ -35,7 +35,7 @@ def serve(
         ),
     ] = None,
 ) -> None:
-    """Offer designs, and rigs that stand, over HTTP under /v1. The guide is docs/api.md.
+    """Offer designs, and rigs that stand, over HTTP under /v1. The guide is docs/how-to/api.md.
 
     Example:  rigwright serve --port 8000 --data rigwright-data --station station.toml
     """

@@ -36,7 +36,7 @@ def test_every_format_makes_the_files_it_names(name: str, tmp_path: Path) -> Non
 
 @pytest.mark.parametrize("name", FORMATS)
 def test_the_document_tells_of_every_format(name: str) -> None:
-    text = (REPO / "docs/exports.md").read_text(encoding="utf-8")
+    text = (REPO / "docs/how-to/exports.md").read_text(encoding="utf-8")
     assert f"`{name}`" in text
     for file in FORMATS[name].files:
         assert file.replace("{image}", "IMAGE") in text

@@ -161,7 +161,7 @@ def test_steps_are_numbered_once() -> None:
 
 
 def test_the_docs_name_every_kind_of_file() -> None:
-    text = (Path(__file__).resolve().parents[3] / "docs/drawings.md").read_text("utf-8")
+    text = (Path(__file__).resolve().parents[3] / "docs/reference/drawings.md").read_text("utf-8")
     for name in (*plan_files(plate(), PlanOptions(step=True)), MANIFEST):
         folder, _, file = name.rpartition("/")
         stem, _, ending = file.rpartition(".")

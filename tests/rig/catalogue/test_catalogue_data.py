@@ -61,7 +61,7 @@ def test_sources_name_no_host() -> None:
 
 
 def test_the_document_counts_right(catalogue: Catalogue) -> None:
-    text = (REPO / "docs/catalogue.md").read_text(encoding="utf-8")
+    text = (REPO / "docs/reference/catalogue.md").read_text(encoding="utf-8")
     assert f"{len(catalogue.cameras)} cameras and {len(catalogue.lenses)} lenses" in text
 
 

@@ -200,7 +200,7 @@ def test_the_parts_are_found_again_by_the_name_they_give() -> None:
 
 
 def test_the_schema_lets_parts_stand_for_numbers() -> None:
-    schema = json.loads((REPO / "docs/rig.schema.json").read_text(encoding="utf-8"))
+    schema = json.loads((REPO / "docs/reference/rig.schema.json").read_text(encoding="utf-8"))
     jsonschema.validate(rig(EXAMPLE), schema)
     with pytest.raises(jsonschema.ValidationError):
         jsonschema.validate(rig({**EXAMPLE, "lenz": "x"}), schema)

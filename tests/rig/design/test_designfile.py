@@ -239,6 +239,6 @@ def test_files_that_are_no_design_files(tmp_path: Path) -> None:
 
 
 def test_the_rig_in_the_document_is_a_design_file(repo: Path) -> None:
-    text = (repo / "docs/design-file.md").read_text(encoding="utf-8")
+    text = (repo / "docs/reference/design-file.md").read_text(encoding="utf-8")
     data = json.loads(text.split("```json\n")[1].split("```")[0])
     assert design_from_mapping(data, "doc", example_rig("face").camera).cameras[0].name == "left"

@@ -12,7 +12,7 @@ from rig.acquisition.cameras import aravis, folder, genicam, gphoto2, opencv
 from rig.acquisition.cameras.registry import BACKENDS
 
 ROOT = Path(__file__).resolve().parents[4]
-PAGE = (ROOT / "docs" / "cameras.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs" / "how-to" / "cameras.md").read_text(encoding="utf-8")
 SECTIONS = {
     match[1]: match[2]
     for match in re.finditer(r"^### `(\w+)`\n(.*?)(?=^##)", PAGE, re.MULTILINE | re.DOTALL)

@@ -258,7 +258,7 @@ def test_burst_pictures_are_dated_by_their_own_instant(shot: Bench) -> None:
 
 
 def test_files_follow_their_schemas(shot: Bench) -> None:
-    docs = Path(__file__).resolve().parents[4] / "docs"
+    docs = Path(__file__).resolve().parents[4] / "docs/reference"
     folder = shot.session.folder
     for name, paths in (
         ("session.schema.json", [folder / "session.json"]),
@@ -370,10 +370,11 @@ def test_colmap_groups_the_pictures_of_one_instant(designed: Bench, tmp_path: Pa
 
 
 def test_the_page_names_every_fault_and_place() -> None:
-    text = (Path(__file__).resolve().parents[4] / "docs/capture.md").read_text(encoding="utf-8")
+    page = Path(__file__).resolve().parents[4] / "docs/explanation/capture.md"
+    text = page.read_text(encoding="utf-8")
     rows = dict(re.findall(r"\| `([a-z-]+)` \| [^|]+\|( yes)? ?\|", text))
     for kind in FaultKind:
-        assert kind.value in rows, f"docs/capture.md does not tell {kind.value}"
+        assert kind.value in rows, f"docs/explanation/capture.md does not tell {kind.value}"
         assert bool(rows[kind.value]) == (kind in HARMLESS)
     for place in (*places.TABLES, places.SESSION, places.INCOMPLETE, places.INTERRUPTED):
         assert place in text

@@ -1,0 +1,1 @@
+"""What is built: mounts, drawings, parts, printed wedges, and the plan that holds them."""
