@@ -24,8 +24,8 @@ from pathlib import Path
 
 from memoryrig import MemoryDevices, line_fit, memory_station, with_policy
 
-from rig.acquisition.capture.rig import open_station
-from rig.acquisition.session import places
+from rig.acquisition.capture.rig import Rig
+from rig.acquisition.session import paths
 from rig.acquisition.session.folder import Session
 from rig.acquisition.session.verify import verify_session
 
@@ -49,8 +49,8 @@ class Tally:
 def child(folder: Path, locks: Path, first: int, pipe: int) -> None:
     """Take captures until killed; each is told only when :meth:`Rig.capture` has returned."""
     station = with_policy(memory_station(3), settle_s=0.0)
-    rig = open_station(station, MemoryDevices(), locks=locks, fit=line_fit)
-    there = (folder / places.SESSION).exists()
+    rig = Rig(station, MemoryDevices(), locks=locks, fit=line_fit)
+    there = (folder / paths.SESSION).exists()
     session = Session.open(folder) if there else rig.new_session(folder)
     os.write(pipe, b"open\n")
     for number in range(first, first + 1000):
@@ -82,7 +82,7 @@ def kill_one(folder: Path, locks: Path, first: int, after_s: float) -> list[str]
 
 def look(folder: Path, told: set[str], tally: Tally) -> None:
     """Open, recover and verify what a killed child left."""
-    if not (folder / places.SESSION).exists():
+    if not (folder / paths.SESSION).exists():
         tally.outcomes["killed before there was a session"] += 1
         if told or folder.exists():
             tally.wrong.append(f"{folder} is lost, or half a session")

@@ -21,7 +21,7 @@ from geometry.arrays import Floats
 from geometry.camera import RigCamera
 from geometry.optics import blur_disk_mm
 from rig.simulation.imaging import SharpImage, fill_backdrop
-from rig.simulation.tracing import View
+from rig.simulation.tracing import SceneView
 
 Singles = NDArray[np.float32]
 
@@ -49,7 +49,7 @@ def blur_px(depth_mm: Singles, rig_camera: RigCamera, f_number: float) -> Single
 
 
 def defocused(
-    image: SharpImage, view: View, table: Singles, rig_camera: RigCamera, f_number: float
+    image: SharpImage, view: SceneView, table: Singles, rig_camera: RigCamera, f_number: float
 ) -> Singles:
     """Light on the sensor (H, W, C) of a lens of finite aperture."""
     seen = image.cover > 0.0
@@ -74,7 +74,7 @@ def defocused(
     return out
 
 
-def _spread(image: SharpImage, blur: Singles, view: View, table: Singles, pad: int) -> Singles:
+def _spread(image: SharpImage, blur: Singles, view: SceneView, table: Singles, pad: int) -> Singles:
     """The light of one band, each pixel spread by its own blur."""
     if float(blur.max()) < LEAST_BLUR_PX:
         return image.radiance

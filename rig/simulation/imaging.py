@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from geometry.camera import RigCamera
 from rig.simulation.raytable import rays_beside
-from rig.simulation.tracing import BACKDROP, FIRST_FLAT, View
+from rig.simulation.tracing import BACKDROP, FIRST_FLAT, SceneView
 
 Singles = NDArray[np.float32]
 
@@ -44,7 +44,7 @@ class SharpImage:
     cover: Singles
 
 
-def sharp_image(view: View, rig_camera: RigCamera, table: Singles, mono: bool) -> SharpImage:
+def sharp_image(view: SceneView, rig_camera: RigCamera, table: Singles, mono: bool) -> SharpImage:
     """What a pinhole in place of the lens would show; one channel if ``mono``, else RGB."""
     height, width = table.shape[:2]
     radiance = np.empty((height, width, 1 if mono else 3), dtype=np.float32)
@@ -69,7 +69,7 @@ def sharp_image(view: View, rig_camera: RigCamera, table: Singles, mono: bool) -
 
 
 def fill_backdrop(
-    image: SharpImage, view: View, table: Singles, where: NDArray[np.bool_]
+    image: SharpImage, view: SceneView, table: Singles, where: NDArray[np.bool_]
 ) -> Singles:
     """The radiance (H, W, C) with the backdrop alone in the pixels ``where`` (H, W)."""
     out = image.radiance.copy()
@@ -102,7 +102,7 @@ def _spread(values: Singles | NDArray[np.uint8]) -> Singles | NDArray[np.uint8]:
 
 
 def _refine(
-    view: View,
+    view: SceneView,
     table: Singles,
     pixels: NDArray[np.intp],
     count: int,

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from geometry.arrays import Floats
 from geometry.raycast import Occluder
-from rig.simulation.motion import Placement
+from rig.simulation.motion import HeadPlacement
 from rig.simulation.settings import LightSettings
 
 Singles = NDArray[np.float32]
@@ -72,7 +72,7 @@ def vertex_light(
     lights: tuple[LightSettings, ...],
     ambient: float,
     sheen: float,
-    placement: Placement,
+    placement: HeadPlacement,
     eye_rig_mm: Floats,
 ) -> Singles:
     """Light on each vertex, (V, 4): red, green, blue for a white surface, and gloss.

@@ -13,7 +13,7 @@ from rig.simulation.settings import MotionSettings
 
 
 @dataclass(frozen=True, eq=False)
-class Placement:
+class HeadPlacement:
     """A rigid placement: ``x_rig = rotation @ x_rest + shift_mm``, (3, 3) and (3,)."""
 
     rotation: Floats
@@ -28,10 +28,10 @@ class Placement:
         return np.asarray(points_rest_mm @ self.rotation.T + self.shift_mm)
 
 
-def placement_at(motion: MotionSettings, time_s: float) -> Placement:
+def placement_at(motion: MotionSettings, time_s: float) -> HeadPlacement:
     """Where the head is ``time_s`` after (or before) it was at rest in its place."""
     turn = np.radians(np.array(motion.angular_velocity_deg_s)) * time_s
-    return Placement(rotation_by(turn), np.array(motion.velocity_mm_s) * time_s)
+    return HeadPlacement(rotation_by(turn), np.array(motion.velocity_mm_s) * time_s)
 
 
 def rotation_by(turn_rad: Floats) -> Floats:

@@ -21,7 +21,7 @@ from rig.simulation.motion import knocked, placement_at
 from rig.simulation.raytable import RayTables
 from rig.simulation.sensor import developed
 from rig.simulation.settings import SceneSettings, SensorSettings
-from rig.simulation.tracing import BackdropView, HeadModel, View
+from rig.simulation.tracing import BackdropView, HeadModel, SceneView
 
 Singles = NDArray[np.float32]
 Triple = tuple[float, float, float]
@@ -126,7 +126,7 @@ class Studio:
             total /= np.float32(samples)
         return softened(total, self.sensor.lens_blur_px)
 
-    def _view(self, rig_camera: RigCamera, shot: Shot, middle_s: float) -> View:
+    def _view(self, rig_camera: RigCamera, shot: Shot, middle_s: float) -> SceneView:
         placement = placement_at(self.scene.motion, middle_s)
         head = None if self.head is None else self.head.view(rig_camera, placement)
         pose = rig_camera.pose
@@ -140,7 +140,7 @@ class Studio:
         backdrop = BackdropView(
             self.scene.backdrop, pose.position_rig_mm, pose.rotation_rig_to_camera
         )
-        return View(backdrop, head, tuple(views))
+        return SceneView(backdrop, head, tuple(views))
 
     def _shown(self, capture: int) -> tuple[Flat, ...]:
         """The targets where they are in a capture."""

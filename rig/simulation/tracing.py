@@ -21,7 +21,7 @@ from rig.simulation.grain import grain
 from rig.simulation.heads import head_mesh
 from rig.simulation.lighting import openness, vertex_light
 from rig.simulation.mesh import TexturedMesh, subdivided
-from rig.simulation.motion import Placement
+from rig.simulation.motion import HeadPlacement
 from rig.simulation.sampling import LINEAR_OF_SRGB, sampled
 from rig.simulation.settings import BackdropSettings, HeadSettings, LightSettings, SceneSettings
 
@@ -54,7 +54,7 @@ class HeadModel:
         self._embree = rtcore_scene.EmbreeScene(robust=True)
         TriangleMesh(scene=self._embree, vertices=local, indices=self._faces)
 
-    def view(self, rig_camera: RigCamera, placement: Placement) -> HeadView:
+    def view(self, rig_camera: RigCamera, placement: HeadPlacement) -> HeadView:
         """The head at a placement as one camera sees it."""
         scene = self._scene
         light = vertex_light(
@@ -189,7 +189,7 @@ class BackdropView:
 
 
 @dataclass(frozen=True, eq=False)
-class View:
+class SceneView:
     """Everything that stands before one camera in one instant."""
 
     backdrop: BackdropView

@@ -7,8 +7,8 @@ from typing import Annotated, Any
 from pydantic import Field, model_validator
 
 from common.errors import ConflictError, NotFoundError
+from rig.acquisition.session.index import read_index
 from rig.acquisition.session.records import CaptureId
-from rig.acquisition.session.recovery import read_books
 from rig.acquisition.session.storage import Disk
 from service.api.context import Service
 from service.api.models import Model
@@ -77,7 +77,7 @@ def picture_source(service: Service, pictures: Pictures) -> tuple[JSON, tuple[Jo
         found = service.store.documents.get(PICTURE_SET, pictures.picture_set_id)
         return {}, (found.as_input("pictures"),)
     folder = service.rigs.session_folder(str(pictures.session))
-    read_books(folder, Disk())
+    read_index(folder, Disk())
     pictures_in_session(folder, pictures.captures)
     return {"session": str(folder), "captures": pictures.captures}, ()
 

@@ -10,8 +10,8 @@ from fastapi.responses import FileResponse
 from pydantic import Field
 
 from common.errors import NotFoundError
+from rig.acquisition.session.index import read_index
 from rig.acquisition.session.records import CaptureRecord, SessionFile
-from rig.acquisition.session.recovery import read_books
 from rig.acquisition.session.storage import Disk
 from rig.acquisition.session.verify import verify_session
 from service.api.context import ServiceDep
@@ -62,7 +62,7 @@ def list_sessions(service: ServiceDep) -> JSON:
 @router.get("/v1/sessions/{session}", response_model=SessionFile, responses=problems(404, 422))
 def read_session(service: ServiceDep, session: str) -> SessionFile:
     """Read what a session holds: its captures and their files."""
-    return read_books(service.rigs.session_folder(session), Disk()).manifest
+    return read_index(service.rigs.session_folder(session), Disk()).manifest
 
 
 @router.get(
@@ -72,7 +72,7 @@ def read_session(service: ServiceDep, session: str) -> SessionFile:
 )
 def read_session_capture(service: ServiceDep, session: str, capture_id: str) -> CaptureRecord:
     """Read the whole record of a capture, a partial one as well."""
-    for record in read_books(service.rigs.session_folder(session), Disk()).records:
+    for record in read_index(service.rigs.session_folder(session), Disk()).records:
         if record.capture_id == capture_id:
             return record
     raise NotFoundError(
@@ -100,10 +100,10 @@ def verify(service: ServiceDep, session: str) -> JSON:
 def read_session_file(service: ServiceDep, session: str, path: str) -> FileResponse:
     """Fetch a picture or another file by the path that the session's records give it."""
     folder = service.rigs.session_folder(session)
-    books = read_books(folder, Disk())
-    known = {entry.path for entry in (*books.manifest.rig, *books.manifest.tables)}
-    known |= {capture.record.path for capture in books.manifest.captures}
-    types = {frame.file.path: frame.media_type for r in books.records for frame in r.frames}
+    index = read_index(folder, Disk())
+    known = {entry.path for entry in (*index.manifest.rig, *index.manifest.tables)}
+    known |= {capture.record.path for capture in index.manifest.captures}
+    types = {frame.file.path: frame.media_type for r in index.records for frame in r.frames}
     # Looked up among what the session lists: what is asked for is never used as a path.
     if path not in known | types.keys() or not (folder / path).is_file():
         raise NotFoundError(

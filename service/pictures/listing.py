@@ -13,7 +13,7 @@ from pathlib import Path, PurePosixPath
 
 from common.errors import InputError, NotFoundError
 from rig.acquisition.cameras.base import FrameStatus
-from rig.acquisition.session.recovery import read_books
+from rig.acquisition.session.index import read_index
 from rig.acquisition.session.storage import Disk
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm", ".webp")
@@ -62,7 +62,7 @@ def pictures_in_session(folder: Path, captures: Sequence[str] = ()) -> tuple[Pic
     Raises :class:`NotFoundError` for a capture that is not there, and :class:`InputError` where
     there are no pictures.
     """
-    records = {record.capture_id: record for record in read_books(folder, Disk()).records}
+    records = {record.capture_id: record for record in read_index(folder, Disk()).records}
     unknown = [name for name in captures if name not in records]
     if unknown:
         raise NotFoundError(

@@ -14,9 +14,10 @@ from common.errors import ConflictError, DeviceError, InterlockError, InternalEr
 from common.files.plain import plain
 from common.progress import CancelToken, Progress, ProgressCallback
 from rig.acquisition.capture.results import RigHealth
-from rig.acquisition.capture.rig import Rig, open_station
+from rig.acquisition.capture.rig import Rig
 from rig.acquisition.station.spec import Station
 from rig.acquisition.trigger.box import TriggerState
+from rig.devices.station import open_station
 from service import logs
 from service.jobs.bell import Bell
 from service.jobs.cancels import Cancels

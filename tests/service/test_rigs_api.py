@@ -17,9 +17,9 @@ from service_helpers import wait_for
 from starlette.testclient import TestClient
 from stations import write_station
 
-from rig.acquisition.capture.rig import open_station
 from rig.acquisition.station.stationfile import read_station
 from rig.acquisition.trigger.fake.program import FakeTrigger, start_fake
+from rig.devices.station import open_station
 from service.api.app import create_app
 from service.api.context import Service
 from service.kinds import KINDS

@@ -33,8 +33,8 @@ from rig.acquisition.cameras.base import (
     Frame,
     TriggerKind,
 )
-from rig.acquisition.cameras.registry import make_backend
 from rig.acquisition.cameras.remotecamera import RemoteCamera
+from rig.devices.registry import make_backend
 
 FAKE_GV = "arv-fake-gv-camera-0.8"
 LIFE_S = 240

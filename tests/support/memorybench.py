@@ -8,7 +8,7 @@ from pathlib import Path
 
 from memoryrig import BoxScript, CameraScript, MemoryBox, MemoryDevices, line_fit, memory_station
 
-from rig.acquisition.capture.rig import Rig, open_station
+from rig.acquisition.capture.rig import Rig
 from rig.acquisition.session.folder import Session
 from rig.acquisition.session.storage import Disk
 from rig.acquisition.station.spec import Station
@@ -43,7 +43,7 @@ class BenchMaker:
     ) -> Bench:
         devices = MemoryDevices(scripts or {}, MemoryBox(box or BoxScript()))
         station = memory_station() if station is None else station
-        rig = open_station(station, devices, locks=self.folder / "locks", fit=line_fit)
+        rig = Rig(station, devices, locks=self.folder / "locks", fit=line_fit)
         place = self.folder / f"session{len(self.made)}"
         bench = Bench(rig, devices, rig.new_session(place, "me", disk=disk))
         self.made.append(bench)

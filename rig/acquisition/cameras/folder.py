@@ -71,7 +71,7 @@ class Watch:
         self._suffixes = tuple(s.lower() for s in suffixes) or tuple(MEDIA_TYPES)
         self._whole: dict[tuple[Path, Stamp], bool] = {}
         self._tags: dict[tuple[Path, Stamp], Mapping[str, str]] = {}
-        self._books = threading.Lock()
+        self._lock = threading.Lock()
 
     def files(self, below: Path) -> dict[Path, Stamp]:
         """Picture files and their stamps. OSError when the folder is not there."""
@@ -89,7 +89,7 @@ class Watch:
 
     def whole(self, path: Path, stamp: Stamp) -> bool:
         """Whether the file is all there; what is not is looked at again."""
-        with self._books:
+        with self._lock:
             if self._whole.get((path, stamp)):
                 return True
             self._whole[path, stamp] = is_whole(path)
@@ -97,7 +97,7 @@ class Watch:
 
     def tags(self, path: Path, stamp: Stamp) -> Mapping[str, str]:
         """The EXIF of a whole file."""
-        with self._books:
+        with self._lock:
             if (path, stamp) not in self._tags:
                 self._tags[path, stamp] = read_exif(path)
             return self._tags[path, stamp]

@@ -61,7 +61,7 @@ class WorkerLink:
         )
         self._on_message, self._on_end = on_message, on_end
         self._answers: dict[int, Future[Any]] = {}
-        self._books = threading.Lock()
+        self._lock = threading.Lock()
         self._writing = threading.Lock()
         self._next = 0
         self._down = ""
@@ -85,7 +85,7 @@ class WorkerLink:
         come, and the worker's own error when it answers with one.
         """
         answer: Future[Any] = Future()
-        with self._books:
+        with self._lock:
             if self._down:
                 raise LinkDown(self._down)
             self._next += 1
@@ -97,7 +97,7 @@ class WorkerLink:
         except FutureTimeoutError:
             raise LinkSilent(f"no answer to '{do}' within {deadline_s:g} s") from None
         finally:
-            with self._books:
+            with self._lock:
                 self._answers.pop(number, None)
 
     def tell(self, do: str) -> None:
@@ -128,7 +128,7 @@ class WorkerLink:
         if "re" not in header:
             self._on_message(header, payload)
             return
-        with self._books:
+        with self._lock:
             answer = self._answers.pop(header["re"], None)
         if answer is None:
             return
@@ -144,7 +144,7 @@ class WorkerLink:
                 self._words.append(line.decode(errors="replace").strip()[:300])
 
     def _end(self, reason: str) -> None:
-        with self._books:
+        with self._lock:
             self._down = reason
             waiting, self._answers = list(self._answers.values()), {}
         for answer in waiting:

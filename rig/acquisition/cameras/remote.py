@@ -18,7 +18,7 @@ class RemoteBackend:
     def __init__(self, spec: WorkerSpec) -> None:
         self._spec = spec
         self._open: dict[str, RemoteCamera] = {}
-        self._books = threading.Lock()
+        self._lock = threading.Lock()
 
     @property
     def name(self) -> str:
@@ -49,7 +49,7 @@ class RemoteBackend:
         return tuple(found[key] for key in sorted(found))
 
     def _held(self) -> list[RemoteCamera]:
-        with self._books:
+        with self._lock:
             self._open = {k: c for k, c in self._open.items() if c.worker_pid is not None}
             return list(self._open.values())
 
@@ -60,7 +60,7 @@ class RemoteBackend:
                 "camera-busy", f"camera {camera_id} is open already", "close it first"
             )
         camera = RemoteCamera(self.spec_for(camera_id), camera_id)
-        with self._books:
+        with self._lock:
             self._open[camera_id] = camera
         return camera
 

@@ -15,8 +15,8 @@ from rig.acquisition.cameras.base import (
     TimestampKind,
     TriggerKind,
 )
-from rig.acquisition.synchrony.instants import Bracket
-from rig.acquisition.synchrony.looks import is_raw
+from rig.acquisition.synchrony.imagechecks import is_raw
+from rig.acquisition.synchrony.triggertimes import HostInterval
 
 CLOCK_READINGS = 8
 SLICE_S = 0.1
@@ -48,7 +48,7 @@ class Collected:
     """What a camera gave. ``sent``: when it was told over its bus, shot by shot."""
 
     frames: tuple[Frame, ...] = ()
-    sent: tuple[Bracket, ...] = ()
+    sent: tuple[HostInterval, ...] = ()
     clock_samples: tuple[ClockSample, ...] = ()
     problem: str = ""
 
@@ -64,7 +64,7 @@ def collect(device: CameraDevice, want: Want) -> Collected:
     """Trigger the camera where that is the host's part, and wait for its pictures."""
     want.start.wait()
     began, start_ns = time.monotonic(), time.monotonic_ns()
-    sent: tuple[Bracket, ...] = ()
+    sent: tuple[HostInterval, ...] = ()
     frames: tuple[Frame, ...] = ()
     samples: tuple[ClockSample, ...] = ()
     try:
@@ -77,7 +77,7 @@ def collect(device: CameraDevice, want: Want) -> Collected:
     return Collected(frames, sent, samples, device.health().problem)
 
 
-def _command(device: CameraDevice, want: Want, began: float) -> tuple[Bracket, ...]:
+def _command(device: CameraDevice, want: Want, began: float) -> tuple[HostInterval, ...]:
     sent = []
     for k in range(want.shots):
         due = began + want.first_s + k * want.interval_s
@@ -85,7 +85,7 @@ def _command(device: CameraDevice, want: Want, began: float) -> tuple[Bracket, .
             break
         before = time.monotonic_ns()
         device.software_trigger()
-        sent.append(Bracket(before, time.monotonic_ns()))
+        sent.append(HostInterval(before, time.monotonic_ns()))
     return tuple(sent)
 
 

@@ -8,10 +8,10 @@ from datetime import datetime
 from enum import StrEnum
 
 from rig.acquisition.cameras.base import CameraSettings, ClockSample
+from rig.acquisition.capture.camerathreads import CameraThread
 from rig.acquisition.capture.collect import Collected
-from rig.acquisition.capture.hands import CameraHand
 from rig.acquisition.synchrony.faults import Fault
-from rig.acquisition.synchrony.instants import Bracket
+from rig.acquisition.synchrony.triggertimes import HostInterval
 from rig.acquisition.trigger.box import ArmRequest, FireOutcome, FireReport
 
 
@@ -32,7 +32,7 @@ FATES = {
 
 
 @dataclass(frozen=True)
-class Order:
+class CaptureOrder:
     """One capture as it was asked for. ``box_capture`` is its name at the box."""
 
     capture_id: str
@@ -55,12 +55,12 @@ class Ready:
 class Firing:
     """What the devices gave. ``fired_at`` is wall-clock time of ``fired.middle_ns``."""
 
-    order: Order
+    order: CaptureOrder
     request: ArmRequest | None
     report: FireReport | None
-    fired: Bracket
+    fired: HostInterval
     fired_at: datetime
-    hands: tuple[CameraHand, ...]
+    threads: tuple[CameraThread, ...]
     ready: Mapping[str, Ready]
     collected: Mapping[str, Collected]
     absent: tuple[str, ...] = ()

@@ -8,8 +8,8 @@ from concurrent.futures import ThreadPoolExecutor
 
 from common.errors import DeviceError, RigwrightError
 from rig.acquisition.cameras.base import CameraBackend, CameraHealth
+from rig.acquisition.capture.camerathreads import CameraThread
 from rig.acquisition.capture.devices import DeviceMaker
-from rig.acquisition.capture.hands import CameraHand
 from rig.acquisition.station.spec import CameraPlan, Station
 from rig.acquisition.trigger.box import TriggerBox
 
@@ -19,7 +19,7 @@ class OpenCameras:
 
     def __init__(self, station: Station, maker: DeviceMaker, box: TriggerBox | None) -> None:
         self._plans = {camera.name: camera for camera in station.cameras}
-        self._hands: dict[str, CameraHand] = {}
+        self._hands: dict[str, CameraThread] = {}
         self.problems: dict[str, str] = {}
         self._backends: dict[str, CameraBackend] = {}
         try:
@@ -32,7 +32,7 @@ class OpenCameras:
 
     def open_lost(self) -> None:
         """Open what is not open, and again what was lost; what cannot be is in ``problems``."""
-        lost = [name for name, hand in self._hands.items() if not hand.health().connected]
+        lost = [name for name, thread in self._hands.items() if not thread.health().connected]
         for name in lost:
             self._hands.pop(name).close()
         wanted = [plan for name, plan in self._plans.items() if name not in self._hands]
@@ -41,16 +41,16 @@ class OpenCameras:
         with ThreadPoolExecutor(len(wanted), "camera-open") as pool:
             opened = list(pool.map(self._open, wanted))
         for plan, outcome in zip(wanted, opened, strict=True):
-            if isinstance(outcome, CameraHand):
+            if isinstance(outcome, CameraThread):
                 self._hands[plan.name] = outcome
                 self.problems.pop(plan.name, None)
             else:
                 self.problems[plan.name] = outcome
 
-    def _open(self, plan: CameraPlan) -> CameraHand | str:
+    def _open(self, plan: CameraPlan) -> CameraThread | str:
         """The open camera, or why there is none."""
         try:
-            return CameraHand(plan, self._backends[plan.backend].open(plan.id))
+            return CameraThread(plan, self._backends[plan.backend].open(plan.id))
         except RigwrightError as error:
             return error.problem
 
@@ -62,14 +62,14 @@ class OpenCameras:
                 "camera-gone", f"no camera could be opened ({told})", "plug them in, then try again"
             )
 
-    def hands(self, station: Station) -> tuple[CameraHand, ...]:
+    def threads(self, station: Station) -> tuple[CameraThread, ...]:
         """The open cameras in the station's order, with its present plans."""
-        hands = []
+        threads = []
         for plan in station.cameras:
             if plan.name in self._hands:
                 self._hands[plan.name].plan = plan
-                hands.append(self._hands[plan.name])
-        return tuple(hands)
+                threads.append(self._hands[plan.name])
+        return tuple(threads)
 
     def health(self) -> Mapping[str, CameraHealth]:
         """How each camera is; those that are not open say why."""
@@ -83,7 +83,7 @@ class OpenCameras:
     def close(self) -> None:
         """Let go of all of them, and of their backends."""
         with ThreadPoolExecutor(max(1, len(self._hands)), "camera-close") as pool:
-            list(pool.map(CameraHand.close, self._hands.values()))
+            list(pool.map(CameraThread.close, self._hands.values()))
         self._hands.clear()
         for backend in self._backends.values():
             # A library that fails to end must not keep the others, and the box, from closing.

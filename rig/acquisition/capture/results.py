@@ -52,7 +52,7 @@ class DryRun:
 
 
 @dataclass(frozen=True)
-class Check:
+class DeviceCheck:
     """One thing looked at: whether it is well, and a sentence."""
 
     name: str
@@ -64,7 +64,7 @@ class Check:
 class SelfTest:
     """What a self-test found; nothing was fired."""
 
-    checks: tuple[Check, ...]
+    checks: tuple[DeviceCheck, ...]
 
     @property
     def ok(self) -> bool:

@@ -12,9 +12,9 @@ from typing import Self
 
 from common.errors import ConflictError, InputError, RigwrightError
 from common.progress import CancelToken, NeverCancelled, Progress, ProgressCallback, ignore_progress
-from rig.acquisition.capture.develop import develop
-from rig.acquisition.capture.devices import DeviceMaker, StationDevices
-from rig.acquisition.capture.firing import Fate, Order
+from rig.acquisition.capture.devices import DeviceMaker
+from rig.acquisition.capture.firing import CaptureOrder, Fate
+from rig.acquisition.capture.judging import pair_and_judge
 from rig.acquisition.capture.opening import OpenCameras
 from rig.acquisition.capture.results import (
     CaptureResult,
@@ -43,42 +43,35 @@ from rig.acquisition.station.locks import DeviceLocks, device_names
 from rig.acquisition.station.pulses import check_burst
 from rig.acquisition.station.spec import Station
 from rig.acquisition.synchrony.boards import station_board
+from rig.acquisition.synchrony.capturedata import CaptureData
 from rig.acquisition.synchrony.clocks import ClockFitter, fit_clock
 from rig.acquisition.synchrony.faults import Fault
 from rig.acquisition.synchrony.lags import with_new_timings
-from rig.acquisition.synchrony.shooting import Shooting
 from rig.acquisition.synchrony.verdict import Board, Evidence, gather
 from rig.acquisition.trigger.box import TriggerBox
 
 NEVER = NeverCancelled()
 
 
-def open_station(
-    station: Station,
-    devices: DeviceMaker | None = None,
-    *,
-    locks: Path | None = None,
-    fit: ClockFitter = fit_clock,
-) -> Rig:
-    """Open a station's box and cameras, and own them until :meth:`Rig.close`.
-
-    A camera that cannot be opened does not stop the others; it is tried again before each
-    capture. ``locks``: where lock files lie, one place per computer by default. Raises
-    :class:`ConflictError` ``device-busy`` when another process has a device, and
-    :class:`DeviceError` when the box, or every camera, is not there.
-    """
-    return Rig(station, StationDevices() if devices is None else devices, locks, fit)
-
-
 class Rig:
     """An open station. All methods may be called from any thread; one thing is done at a time.
+
+    ``maker`` makes its devices; they are owned until :meth:`close`. ``locks``: where lock files
+    lie, one place per computer by default. A camera that cannot be opened does not stop the
+    others; it is tried again before each capture. Raises :class:`ConflictError` ``device-busy``
+    when another process has a device, and :class:`DeviceError` when the box, or every camera,
+    is not there.
 
     :meth:`abort` and :meth:`health` are allowed always; what else is asked for meanwhile is
     refused with :class:`ConflictError` ``rig-busy``, which says what it is busy with.
     """
 
     def __init__(
-        self, station: Station, maker: DeviceMaker, locks: Path | None, fit: ClockFitter
+        self,
+        station: Station,
+        maker: DeviceMaker,
+        locks: Path | None = None,
+        fit: ClockFitter = fit_clock,
     ) -> None:
         self.station = station
         self.box: TriggerBox | None = None
@@ -136,7 +129,9 @@ class Rig:
         self, folder: Path, subject: str = "", operator: str = "", disk: Disk | None = None
     ) -> Session:
         """Begin a session with this rig in a new folder."""
-        infos = {hand.plan.name: hand.device.info for hand in self._cameras.hands(self.station)}
+        infos = {
+            thread.plan.name: thread.device.info for thread in self._cameras.threads(self.station)
+        }
         plan = session_plan(self.station, self._design, infos, subject, operator)
         return Session.create(folder, plan, disk)
 
@@ -170,20 +165,20 @@ class Rig:
             session.require_space(self.station.policy.min_free_mb)
             stage = Stage(session, capture_id)
             name = box_name(session.manifest.session_id, capture_id)
-            order = Order(capture_id, name, shots, interval_us, partial)
+            order = CaptureOrder(capture_id, name, shots, interval_us, partial)
             run = self._run(order, progress, cancel, stage)
-            shooting, evidence = self._shoot(run, stage, board or station_board(self.station))
+            captured, evidence = self._shoot(run, stage, board or station_board(self.station))
             progress(Progress("writing", 0.8))
-            record = self._commit(stage, shooting, evidence, partial)
+            record = self._commit(stage, captured, evidence, partial)
             progress(Progress("committed", 1.0))
             return CaptureResult(record, session.folder)
 
     def _commit(
-        self, stage: Stage, shooting: Shooting, evidence: Evidence, partial: bool
+        self, stage: Stage, captured: CaptureData, evidence: Evidence, partial: bool
     ) -> CaptureRecord:
         try:
             return stage.commit(
-                shooting,
+                captured,
                 evidence,
                 self.station.policy,
                 partial_allowed=partial,
@@ -199,14 +194,14 @@ class Rig:
 
     def _shoot(
         self, run: CaptureRun, stage: Stage, board: Board | None
-    ) -> tuple[Shooting, Evidence]:
+    ) -> tuple[CaptureData, Evidence]:
         """Fire and judge; on any error the stage tells what became of the id."""
         try:
             firing = run.run()
             run.progress(Progress("checking pictures", 0.7))
             sizes = picture_sizes(self.station, self._design)
-            shooting = develop(self.station, firing, self._fit, sizes)
-            return shooting, gather(self.station, shooting, board)
+            captured = pair_and_judge(self.station, firing, self._fit, sizes)
+            return captured, gather(self.station, captured, board)
         except BaseException as error:
             # Whatever else goes wrong now, the first error is the one to be told.
             with contextlib.suppress(RigwrightError):
@@ -230,7 +225,7 @@ class Rig:
         check_burst(self.station, shots, interval_us)
         with self._busy_with("a dry run"):
             began = time.monotonic()
-            order = Order("dry-run", box_name("dry-run"), shots, interval_us, partial)
+            order = CaptureOrder("dry-run", box_name("dry-run"), shots, interval_us, partial)
             faults = self._run(order, progress, cancel).rehearse()
             lost = {fault.camera for fault in faults}
             ready = tuple(c.name for c in self.station.cameras if c.name not in lost)
@@ -240,8 +235,8 @@ class Rig:
         """Look at box, interlock, clock, cameras and the space in ``folder``; fires nothing."""
         with self._busy_with("a self-test"):
             self._cameras.open_lost()
-            hands = self._cameras.hands(self.station)
-            return self_test(self.station, self.box, hands, self._cameras.problems, folder)
+            threads = self._cameras.threads(self.station)
+            return self_test(self.station, self.box, threads, self._cameras.problems, folder)
 
     def sync_check(
         self,
@@ -265,21 +260,21 @@ class Rig:
                 progress(Progress(f"capture {k + 1} of {captures}", k / captures))
                 if k > 0:
                     self._aborted.wait(pause_s)
-                shooting, evidence = self._look_once(k + 1, board, cancel)
+                captured, evidence = self._look_once(k + 1, board, cancel)
                 seen.append(evidence)
-                faults += shooting.all_faults
+                faults += captured.all_faults
             progress(Progress("done", 1.0))
         return judged_lags(self.station, seen, faults)
 
     def _look_once(
         self, number: int, board: Board | None, cancel: CancelToken
-    ) -> tuple[Shooting, Evidence]:
+    ) -> tuple[CaptureData, Evidence]:
         """One capture of which nothing is filed."""
-        order = Order(f"sync-check-{number}", box_name("sync-check"))
+        order = CaptureOrder(f"sync-check-{number}", box_name("sync-check"))
         firing = self._run(order, ignore_progress, cancel).run()
         sizes = picture_sizes(self.station, self._design)
-        shooting = develop(self.station, firing, self._fit, sizes)
-        return shooting, gather(self.station, shooting, board or station_board(self.station))
+        captured = pair_and_judge(self.station, firing, self._fit, sizes)
+        return captured, gather(self.station, captured, board or station_board(self.station))
 
     def adopt(self, timings: Mapping[str, Timing]) -> None:
         """Work with new delays from now on; the station file is written by ``write_timings``."""
@@ -287,7 +282,7 @@ class Rig:
 
     def _run(
         self,
-        order: Order,
+        order: CaptureOrder,
         progress: ProgressCallback,
         cancel: CancelToken,
         stage: Stage | None = None,
@@ -296,7 +291,7 @@ class Rig:
         return CaptureRun(
             station=self.station,
             box=self.box,
-            hands=self._cameras.hands(self.station),
+            threads=self._cameras.threads(self.station),
             order=order,
             progress=progress,
             cancel=EitherToken(cancel, self._aborted),

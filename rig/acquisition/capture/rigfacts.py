@@ -11,7 +11,7 @@ from common.errors import ConflictError, InputError
 from common.files.plain import plain
 from geometry.camera import RigCamera
 from rig.acquisition.cameras.base import CameraInfo
-from rig.acquisition.session import places
+from rig.acquisition.session import paths
 from rig.acquisition.session.colmap import rig_config
 from rig.acquisition.session.folder import SessionPlan
 from rig.acquisition.session.jsonfiles import json_bytes
@@ -52,21 +52,6 @@ def read_rig_design(station: Station) -> RigDesign:
     return RigDesign(named, Path(station.design).read_bytes())
 
 
-def simulated_cameras(station: Station) -> Mapping[str, RigCamera]:
-    """What the simulated backend has to know of its cameras: where they stand and what they are.
-
-    Raises :class:`InputError` for a station without a design.
-    """
-    design = read_rig_design(station)
-    if not design.cameras:
-        raise InputError(
-            "station-no-design",
-            "simulated cameras need a design, which says where they stand",
-            'make one with `rigwright design` and name it: design = "design.json"',
-        )
-    return design.cameras
-
-
 def picture_sizes(station: Station, design: RigDesign) -> dict[str, tuple[int, int]]:
     """What each camera's pictures must measure, as far as that is known."""
     sizes = {name: placed.camera.image_size_px for name, placed in design.cameras.items()}
@@ -89,13 +74,13 @@ def session_plan(
     operator: str = "",
 ) -> SessionPlan:
     """What a new session at this station is about."""
-    files = {f"{places.RIG}/rig.json": json_bytes(_rig_document(station, design, infos))}
+    files = {f"{paths.RIG}/rig.json": json_bytes(_rig_document(station, design, infos))}
     if station.text:
-        files[f"{places.RIG}/station.toml"] = station.text.encode()
+        files[f"{paths.RIG}/station.toml"] = station.text.encode()
     if design.cameras:
-        files[f"{places.RIG}/design.json"] = design.data
-        files[f"{places.RIG}/rig_config.json"] = json_bytes(rig_config(design.cameras))
-        files[f"{places.RIG}/calibration.json"] = json_bytes(_calibration(design))
+        files[f"{paths.RIG}/design.json"] = design.data
+        files[f"{paths.RIG}/rig_config.json"] = json_bytes(rig_config(design.cameras))
+        files[f"{paths.RIG}/calibration.json"] = json_bytes(_calibration(design))
     return SessionPlan(station.name, rig_sha256(station, design), files, subject, operator)
 
 
@@ -138,7 +123,7 @@ def _rig_document(
                 "model": infos[camera.name].model if camera.name in infos else "",
                 "output": camera.output,
                 "focus_output": camera.focus_output,
-                "folder": f"{places.IMAGES}/{camera.name}",
+                "folder": f"{paths.IMAGES}/{camera.name}",
             }
             for camera in station.cameras
         ],

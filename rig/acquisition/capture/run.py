@@ -13,13 +13,13 @@ from functools import partial
 from common.errors import CancelledError, DeviceError, InterlockError, RigwrightError
 from common.progress import CancelToken, Progress, ProgressCallback
 from rig.acquisition.cameras.base import ArmSpec, CameraDevice, CameraSettings
+from rig.acquisition.capture.camerathreads import CameraThread, do_all, outcomes
 from rig.acquisition.capture.collect import Collected, Want, collect, read_clock
-from rig.acquisition.capture.firing import FATES, Fate, Firing, Order, Ready
-from rig.acquisition.capture.hands import CameraHand, do_all, outcomes
+from rig.acquisition.capture.firing import FATES, CaptureOrder, Fate, Firing, Ready
 from rig.acquisition.station.pulses import arm_request
 from rig.acquisition.station.spec import Interlock, Station
 from rig.acquisition.synchrony.faults import Fault, FaultKind
-from rig.acquisition.synchrony.instants import Bracket
+from rig.acquisition.synchrony.triggertimes import HostInterval
 from rig.acquisition.trigger.box import ArmRequest, FireOutcome, FireReport, TriggerBox
 
 WATCH_S = 0.05
@@ -37,8 +37,8 @@ class CaptureRun:
 
     station: Station
     box: TriggerBox | None
-    hands: tuple[CameraHand, ...]
-    order: Order
+    threads: tuple[CameraThread, ...]
+    order: CaptureOrder
     progress: ProgressCallback
     cancel: CancelToken
     may_fire: Callable[[], None]
@@ -59,11 +59,11 @@ class CaptureRun:
         try:
             ready, faults = self._arm_cameras()
             self._stop_if_cancelled()
-            hands = tuple(hand for hand in self.hands if hand.plan.name in ready)
+            threads = tuple(thread for thread in self.threads if thread.plan.name in ready)
             self.may_fire()
-            request = self._arm_box(hands)
+            request = self._arm_box(threads)
             self._stop_if_cancelled()
-            return self._fire(hands, ready, request, faults)
+            return self._fire(threads, ready, request, faults)
         finally:
             self._disarm()
 
@@ -76,7 +76,7 @@ class CaptureRun:
         try:
             ready, faults = self._arm_cameras()
             self._stop_if_cancelled()
-            self._arm_box(tuple(hand for hand in self.hands if hand.plan.name in ready))
+            self._arm_box(tuple(thread for thread in self.threads if thread.plan.name in ready))
             return faults
         finally:
             self._disarm()
@@ -96,8 +96,8 @@ class CaptureRun:
         policy = self.station.policy
         spec = ArmSpec(self.order.capture_id, self.order.shots, policy.frame_deadline_s)
         jobs = {
-            hand.plan.name: hand.do(partial(_arm, settings=hand.plan.settings, spec=spec))
-            for hand in self.hands
+            thread.plan.name: thread.do(partial(_arm, settings=thread.plan.settings, spec=spec))
+            for thread in self.threads
         }
         ready, late = outcomes(jobs, policy.ready_deadline_s)
         problems = {**self.unopened, **late}
@@ -114,11 +114,11 @@ class CaptureRun:
         )
         return ready, faults
 
-    def _arm_box(self, hands: tuple[CameraHand, ...]) -> ArmRequest | None:
+    def _arm_box(self, threads: tuple[CameraThread, ...]) -> ArmRequest | None:
         if self.box is None:
             return None
         self.progress(Progress("arming the box", 0.25))
-        plans = tuple(hand.plan for hand in hands)
+        plans = tuple(thread.plan for thread in threads)
         order = self.order
         request = arm_request(
             self.station, plans, order.box_capture, order.shots, order.interval_us
@@ -132,7 +132,7 @@ class CaptureRun:
 
     def _fire(
         self,
-        hands: tuple[CameraHand, ...],
+        threads: tuple[CameraThread, ...],
         ready: dict[str, Ready],
         request: ArmRequest | None,
         faults: tuple[Fault, ...],
@@ -141,8 +141,8 @@ class CaptureRun:
         self._pictures = self.order.shots
         start = threading.Event()
         jobs = {
-            hand.plan.name: hand.do(partial(collect, want=self._want(hand, ready, start)))
-            for hand in hands
+            thread.plan.name: thread.do(partial(collect, want=self._want(thread, ready, start)))
+            for thread in threads
         }
         self.fate = Fate.UNKNOWN
         before = time.monotonic_ns()
@@ -150,11 +150,11 @@ class CaptureRun:
         try:
             with self._abort_when_cancelled():
                 problem = self._fire_box(request)
-                fired = Bracket(before, time.monotonic_ns())
+                fired = HostInterval(before, time.monotonic_ns())
                 wall = datetime.fromtimestamp(time.time(), UTC).astimezone()
                 report = self._await_box(problem, request)
                 self.progress(Progress("waiting for pictures", 0.4))
-                patience_s = self._last_deadline_s() + BOX_MARGIN_S + _overrun_s(hands)
+                patience_s = self._last_deadline_s() + BOX_MARGIN_S + _overrun_s(threads)
                 collected, problems = outcomes(jobs, patience_s)
         finally:
             # The camera threads must not go on waiting for pictures that nobody will take.
@@ -164,11 +164,13 @@ class CaptureRun:
             collected[name] = Collected(problem=text)
         absent = tuple(fault.camera for fault in faults if fault.camera is not None)
         return Firing(
-            self.order, request, report, fired, wall, hands, ready, collected, absent, faults
+            self.order, request, report, fired, wall, threads, ready, collected, absent, faults
         )
 
-    def _want(self, hand: CameraHand, ready: Mapping[str, Ready], start: threading.Event) -> Want:
-        policy, plan = self.station.policy, hand.plan
+    def _want(
+        self, thread: CameraThread, ready: Mapping[str, Ready], start: threading.Event
+    ) -> Want:
+        policy, plan = self.station.policy, thread.plan
         samples = ready[plan.name].clock_samples
         lead = 0.0 if self.station.trigger is None else self.station.trigger.lead_us
         return Want(
@@ -226,7 +228,7 @@ class CaptureRun:
         """From FIRE to the deadline of the last picture."""
         order, trigger = self.order, self.station.trigger
         lead = 0.0 if trigger is None else trigger.lead_us
-        delays = [self.station.shutter_delay_us(hand.plan) for hand in self.hands]
+        delays = [self.station.shutter_delay_us(thread.plan) for thread in self.threads]
         burst = (order.shots - 1) * order.interval_us
         policy = self.station.policy
         return (lead + burst + max(delays)) / 1e6 + policy.frame_deadline_s + policy.settle_s
@@ -263,11 +265,11 @@ class CaptureRun:
                 # A box that is gone disarms itself; the cameras must be disarmed all the same.
                 with contextlib.suppress(RigwrightError):
                     self.box.disarm(name)
-        do_all(self.hands, lambda device: device.disarm(), self.station.policy.ready_deadline_s)
+        do_all(self.threads, lambda device: device.disarm(), self.station.policy.ready_deadline_s)
 
 
-def _overrun_s(hands: tuple[CameraHand, ...]) -> float:
-    return max((hand.device.capabilities.wait_overrun_s for hand in hands), default=0.0)
+def _overrun_s(threads: tuple[CameraThread, ...]) -> float:
+    return max((thread.device.capabilities.wait_overrun_s for thread in threads), default=0.0)
 
 
 def _arm(device: CameraDevice, settings: CameraSettings, spec: ArmSpec) -> Ready:

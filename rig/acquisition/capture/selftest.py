@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from rig.acquisition.cameras.base import ArmSpec, CameraDevice, CameraSettings
-from rig.acquisition.capture.hands import CameraHand, outcomes
-from rig.acquisition.capture.results import Check, SelfTest
+from rig.acquisition.capture.camerathreads import CameraThread, outcomes
+from rig.acquisition.capture.results import DeviceCheck, SelfTest
 from rig.acquisition.session.storage import Disk
 from rig.acquisition.station.spec import CameraPlan, Interlock, Station
 from rig.acquisition.trigger.box import TriggerBox, TriggerState
@@ -21,19 +21,19 @@ WORST_CLOCK_US = 500.0
 def self_test(
     station: Station,
     box: TriggerBox | None,
-    hands: Sequence[CameraHand],
+    threads: Sequence[CameraThread],
     problems: Mapping[str, str],
     folder: Path | None,
 ) -> SelfTest:
     """All checks. ``problems``: cameras that could not be opened, and why."""
     checks = [] if box is None else _box_checks(station, box)
-    jobs = {hand.plan.name: hand.do(_Rehearsal(hand.plan, station)) for hand in hands}
+    jobs = {thread.plan.name: thread.do(_Rehearsal(thread.plan, station)) for thread in threads}
     ready, late = outcomes(jobs, station.policy.ready_deadline_s)
     words = {**problems, **late}
     for camera in station.cameras:
         ok = camera.name in ready
         text = f"ready within {ready[camera.name]:.2f} s" if ok else words[camera.name]
-        checks.append(Check(f"camera {camera.name}", ok, text))
+        checks.append(DeviceCheck(f"camera {camera.name}", ok, text))
     if folder is not None:
         checks.append(_space(station, folder))
     return SelfTest(tuple(checks))
@@ -56,29 +56,31 @@ class _Rehearsal:
         return time.monotonic() - began
 
 
-def _box_checks(station: Station, box: TriggerBox) -> list[Check]:
+def _box_checks(station: Station, box: TriggerBox) -> list[DeviceCheck]:
     health = box.health()
     well = health.state is TriggerState.READY
     who = f"{health.identity or 'trigger box'}, {health.state.value}"
     text = who if well or not health.last_problem else f"{who}: {health.last_problem}"
-    checks = [Check("trigger box", well, text), _interlock(station, health.interlock_closed)]
+    checks = [DeviceCheck("trigger box", well, text), _interlock(station, health.interlock_closed)]
     if box.capabilities.clock:
         residual = health.clock_residual_us
         fine = residual is not None and residual <= WORST_CLOCK_US
         said = "is not known yet" if residual is None else f"is known to {residual:.0f} us"
-        checks.append(Check("clock", fine, f"the box's clock {said}"))
+        checks.append(DeviceCheck("clock", fine, f"the box's clock {said}"))
     return checks
 
 
-def _interlock(station: Station, closed: bool | None) -> Check:
+def _interlock(station: Station, closed: bool | None) -> DeviceCheck:
     required = station.trigger is not None and station.trigger.interlock is Interlock.REQUIRED
     words = {True: "closed", False: "open", None: "the box has none"}
     ok = closed is True or (closed is None and not required)
-    return Check("interlock", ok, words[closed])
+    return DeviceCheck("interlock", ok, words[closed])
 
 
-def _space(station: Station, folder: Path) -> Check:
+def _space(station: Station, folder: Path) -> DeviceCheck:
     there = next(path for path in (folder, *folder.resolve().parents) if path.is_dir())
     free_mb = Disk().free_bytes(there) / MEGABYTE
     least = station.policy.min_free_mb
-    return Check("free space", free_mb >= least, f"{free_mb:.0f} MB free, {least:.0f} MB wanted")
+    return DeviceCheck(
+        "free space", free_mb >= least, f"{free_mb:.0f} MB free, {least:.0f} MB wanted"
+    )

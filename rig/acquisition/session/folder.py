@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import glob
-import os
 import re
 import secrets
 from collections.abc import Mapping
@@ -16,11 +14,13 @@ from types import TracebackType
 from typing import Self
 
 from common.errors import ConflictError, InputError, NotFoundError
-from rig.acquisition.session import places
-from rig.acquisition.session.commit import Books, write_books
+from common.files.lock import KernelLock, LockHeldError, lock_folder
+from rig.acquisition.session import paths
+from rig.acquisition.session.commit import write_index
+from rig.acquisition.session.index import SessionIndex, read_index
 from rig.acquisition.session.jsonfiles import entry
 from rig.acquisition.session.records import CaptureRecord, InterruptedEntry, SessionFile
-from rig.acquisition.session.recovery import Recovery, read_books, recover_books
+from rig.acquisition.session.recovery import Recovery, recover_index
 from rig.acquisition.session.storage import Disk, disk_errors
 from rig.design.designfile import program_version
 
@@ -45,10 +45,10 @@ class SessionPlan:
 class Session:
     """An open session; one process at a time has it. Closing lets another have it."""
 
-    def __init__(self, books: Books, lock: int, recovery: Recovery) -> None:
-        self.books = books
+    def __init__(self, index: SessionIndex, lock: KernelLock, recovery: Recovery) -> None:
+        self.index = index
         self.recovery = recovery
-        self._lock: int | None = lock
+        self._lock = lock
 
     @classmethod
     def create(cls, folder: Path, plan: SessionPlan, disk: Disk | None = None) -> Self:
@@ -66,15 +66,15 @@ class Session:
             # The lock is on the folder itself and stays with it when it is renamed.
             lock = _locked(half)
             try:
-                books = _begin(half, plan, disk)
+                index = _begin(half, plan, disk)
                 _require_new(folder)
                 disk.move(half, folder)
                 disk.sync_folder(folder.parent)
             except BaseException:
-                os.close(lock)
+                lock.release()
                 disk.remove(half)
                 raise
-        return cls(Books(folder, disk, books.manifest, ()), lock, Recovery())
+        return cls(SessionIndex(folder, disk, index.manifest, ()), lock, Recovery())
 
     @classmethod
     def open(cls, folder: Path, disk: Disk | None = None) -> Self:
@@ -87,31 +87,31 @@ class Session:
         lock = _locked(folder)
         try:
             with disk_errors(folder):
-                books, recovery = recover_books(read_books(folder, disk))
+                index, recovery = recover_index(read_index(folder, disk))
         except BaseException:
-            os.close(lock)
+            lock.release()
             raise
-        return cls(books, lock, recovery)
+        return cls(index, lock, recovery)
 
     @property
     def folder(self) -> Path:
         """Where it lies."""
-        return self.books.folder
+        return self.index.folder
 
     @property
     def manifest(self) -> SessionFile:
         """What ``session.json`` says."""
-        return self.books.manifest
+        return self.index.manifest
 
     @property
     def next_number(self) -> int:
         """The number the next capture gets."""
-        return max((record.number for record in self.books.records), default=0) + 1
+        return max((record.number for record in self.index.records), default=0) + 1
 
     @property
     def next_instant(self) -> int:
         """The number of the next capture's first instant: the name of its pictures."""
-        ends = [record.first_instant + record.shots for record in self.books.records]
+        ends = [record.first_instant + record.shots for record in self.index.records]
         return max(ends, default=1)
 
     def committed(self, capture_id: str) -> CaptureRecord | None:
@@ -126,7 +126,7 @@ class Session:
                 f"{capture_id!r} is no capture id",
                 "give 1 to 64 letters, digits, '-', '_' or '.', a letter or digit first",
             )
-        lost = self.books.interrupted(capture_id)
+        lost = self.index.interrupted(capture_id)
         if lost is not None:
             told = "may have fired" if lost.fate == "unknown" else "fired"
             raise ConflictError(
@@ -134,7 +134,7 @@ class Session:
                 f"capture {capture_id} was interrupted after it {told} ({lost.why})",
                 "take a new capture under another id",
             )
-        return self.books.committed(capture_id)
+        return self.index.committed(capture_id)
 
     def tidy(self, known: InterruptedEntry | None = None) -> None:
         """Bring in order what a failed write of this very process left behind.
@@ -142,15 +142,15 @@ class Session:
         What the disk says counts, not what this process believes: the failure may have come
         after the capture was committed. ``known`` as for :func:`recover_books`.
         """
-        if (self.folder / places.INCOMPLETE).exists():
+        if (self.folder / paths.INCOMPLETE).exists():
             with disk_errors(self.folder):
-                on_disk = read_books(self.folder, self.books.disk)
-                self.books, self.recovery = recover_books(on_disk, known)
+                on_disk = read_index(self.folder, self.index.disk)
+                self.index, self.recovery = recover_index(on_disk, known)
 
     def require_space(self, least_mb: float) -> None:
         """Raise :class:`ConflictError` ``disk-full`` when less is free."""
         with disk_errors(self.folder):
-            free_mb = self.books.disk.free_bytes(self.folder) / MEGABYTE
+            free_mb = self.index.disk.free_bytes(self.folder) / MEGABYTE
         if free_mb < least_mb:
             raise ConflictError(
                 "disk-full",
@@ -160,9 +160,7 @@ class Session:
 
     def close(self) -> None:
         """Let go of it; closing twice changes nothing."""
-        if self._lock is not None:
-            os.close(self._lock)
-            self._lock = None
+        self._lock.release()
 
     def __enter__(self) -> Self:
         return self
@@ -189,10 +187,10 @@ def _remove_stale(folder: Path, disk: Disk) -> None:
         with contextlib.suppress(ConflictError, NotFoundError):
             lock = _locked(half)
             disk.remove(half)
-            os.close(lock)
+            lock.release()
 
 
-def _begin(half: Path, plan: SessionPlan, disk: Disk) -> Books:
+def _begin(half: Path, plan: SessionPlan, disk: Disk) -> SessionIndex:
     for path, data in plan.rig_files.items():
         disk.make_folder((half / path).parent)
         disk.write(half / path, data)
@@ -212,9 +210,9 @@ def _begin(half: Path, plan: SessionPlan, disk: Disk) -> Books:
         interrupted=[],
         digest="",
     )
-    books = write_books(Books(half, disk, manifest, ()))
-    disk.remove(half / places.INCOMPLETE)
-    return books
+    index = write_index(SessionIndex(half, disk, manifest, ()))
+    disk.remove(half / paths.INCOMPLETE)
+    return index
 
 
 def _require_new(folder: Path) -> None:
@@ -224,21 +222,17 @@ def _require_new(folder: Path) -> None:
         )
 
 
-def _locked(folder: Path) -> int:
-    """The kernel's lock on the folder itself: no file of its own that a copy would carry along."""
+def _locked(folder: Path) -> KernelLock:
+    """The lock on the folder itself: no file of its own that a copy would carry along."""
     try:
-        handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+        return lock_folder(folder)
     except (FileNotFoundError, NotADirectoryError) as error:
         raise NotFoundError(
             "session-not-found", f"{folder} is not a session", "give a session's folder"
         ) from error
-    try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        os.close(handle)
+    except LockHeldError:
         raise ConflictError(
             "session-busy",
             f"another process works on the session {folder}",
             "wait for it, or stop it",
         ) from None
-    return handle

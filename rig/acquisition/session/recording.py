@@ -7,10 +7,10 @@ from dataclasses import asdict, dataclass
 
 from common.files.plain import plain
 from rig.acquisition.session.records import CaptureRecord, FileEntry
+from rig.acquisition.synchrony.cameraframes import Pair
+from rig.acquisition.synchrony.capturedata import CameraPart, CaptureData
 from rig.acquisition.synchrony.evidence import CameraTiming, FrameTiming, sync_class
 from rig.acquisition.synchrony.faults import Fault
-from rig.acquisition.synchrony.shooting import CameraPart, Shooting
-from rig.acquisition.synchrony.take import Pair
 from rig.acquisition.synchrony.verdict import Evidence
 
 
@@ -34,7 +34,7 @@ class Numbering:
 
 
 def make_record(
-    shooting: Shooting,
+    captured: CaptureData,
     evidence: Evidence,
     files: Sequence[FiledFrame],
     numbering: Numbering,
@@ -47,20 +47,20 @@ def make_record(
     cameras = {c.camera: c for c in evidence.stamps.cameras}
     document = {
         "schema": "rigwright.capture/1",
-        "capture_id": shooting.capture_id,
+        "capture_id": captured.capture_id,
         "number": numbering.number,
-        "fired_at": shooting.fired_at.isoformat(),
-        "shots": shooting.shots,
-        "interval_us": shooting.interval_us,
+        "fired_at": captured.fired_at.isoformat(),
+        "shots": captured.shots,
+        "interval_us": captured.interval_us,
         "first_instant": numbering.first_instant,
-        "state": "complete" if shooting.whole else "partial",
+        "state": "complete" if captured.whole else "partial",
         "partial_allowed": partial_allowed,
-        "missing": shooting.missing(),
+        "missing": captured.missing(),
         "verdict": evidence.verdict,
-        "faults": [*shooting.all_faults, *more_faults],
-        "cameras": [_camera(part, cameras[part.plan.name]) for part in shooting.parts],
+        "faults": [*captured.all_faults, *more_faults],
+        "cameras": [_camera(part, cameras[part.plan.name]) for part in captured.parts],
         "frames": [_frame(f, timings, numbering) for f in files],
-        "trigger": _trigger(shooting, evidence),
+        "trigger": _trigger(captured, evidence),
         "timing": evidence.stamps.shots,
         "optical": evidence.optical,
     }
@@ -68,7 +68,7 @@ def make_record(
 
 
 def _camera(part: CameraPart, timing: CameraTiming) -> dict[str, object]:
-    capabilities = part.take.capabilities
+    capabilities = part.received.capabilities
     return {
         "name": part.plan.name,
         "backend": part.plan.backend,
@@ -97,7 +97,7 @@ def _frame(
 ) -> dict[str, object]:
     frame, shot = filed.pair.frame, filed.pair.shot
     name = filed.part.plan.name
-    instant = next((i for i in filed.part.take.instants if i.shot == shot), None)
+    instant = next((i for i in filed.part.received.trigger_times if i.shot == shot), None)
     timing = timings.get((name, shot))
     return {
         "camera": name,
@@ -123,8 +123,8 @@ def _frame(
     }
 
 
-def _trigger(shooting: Shooting, evidence: Evidence) -> dict[str, object] | None:
-    report = shooting.report
+def _trigger(captured: CaptureData, evidence: Evidence) -> dict[str, object] | None:
+    report = captured.report
     if report is None:
         return None
     return {

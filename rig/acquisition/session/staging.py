@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 from datetime import timedelta
 
 from common.errors import ConflictError
-from rig.acquisition.session import places
+from rig.acquisition.session import paths
 from rig.acquisition.session.commit import clear_stage, publish, set_aside
 from rig.acquisition.session.exif import PictureFacts
 from rig.acquisition.session.folder import Session
@@ -19,10 +19,10 @@ from rig.acquisition.session.records import CaptureRecord
 from rig.acquisition.session.recovery import interrupted
 from rig.acquisition.session.storage import disk_errors
 from rig.acquisition.station.spec import CapturePolicy
+from rig.acquisition.synchrony.cameraframes import Pair
+from rig.acquisition.synchrony.capturedata import CameraPart, CaptureData
 from rig.acquisition.synchrony.faults import Fault, FaultKind
-from rig.acquisition.synchrony.looks import is_raw
-from rig.acquisition.synchrony.shooting import CameraPart, Shooting
-from rig.acquisition.synchrony.take import Pair
+from rig.acquisition.synchrony.imagechecks import is_raw
 from rig.acquisition.synchrony.verdict import Evidence
 
 WRITERS = 2
@@ -42,7 +42,7 @@ class Stage:
         self._session = session
         self._id = capture_id
         self._writers = writers
-        self._folder = places.stage(session.folder, capture_id)
+        self._folder = paths.stage(session.folder, capture_id)
         session.tidy()
         if session.committed(capture_id) is not None:
             raise ConflictError(
@@ -51,25 +51,25 @@ class Stage:
                 "read it, or take a new one under another id",
             )
         with disk_errors(session.folder):
-            session.books.disk.make_folder(self._folder)
+            session.index.disk.make_folder(self._folder)
 
     def may_fire(self, box_capture: str) -> None:
         """From now on this capture may have fired, until somebody says otherwise."""
         intent = {"capture_id": self._id, "box_capture": box_capture}
         with disk_errors(self._session.folder):
-            books = self._session.books
-            books.disk.replace(self._folder / places.INTENT, json_bytes(intent), books.scratch)
+            index = self._session.index
+            index.disk.replace(self._folder / paths.INTENT, json_bytes(intent), index.scratch)
 
     def drop(self) -> None:
         """Nothing was fired: nothing is left."""
         with disk_errors(self._session.folder):
-            clear_stage(self._session.books, self._folder)
+            clear_stage(self._session.index, self._folder)
 
     def set_aside(self, fate: str, why: str) -> None:
         """It fired, or may have, and cannot be committed: its id is never used again."""
         with disk_errors(self._session.folder):
             aside = interrupted(self._id, fate, why)
-            self._session.books = set_aside(self._session.books, aside)
+            self._session.index = set_aside(self._session.index, aside)
 
     def settle(self, why: str) -> CaptureRecord | None:
         """After a failed commit of what was fired: committed after all, or set aside.
@@ -77,11 +77,11 @@ class Stage:
         Raises when the disk fails still; the next opening of the session then settles it.
         """
         self._session.tidy(interrupted(self._id, "fired", why))
-        return self._session.books.committed(self._id)
+        return self._session.index.committed(self._id)
 
     def commit(
         self,
-        shooting: Shooting,
+        captured: CaptureData,
         evidence: Evidence,
         policy: CapturePolicy,
         *,
@@ -93,27 +93,27 @@ class Stage:
         session = self._session
         numbering = Numbering(session.next_number, session.next_instant)
         with disk_errors(session.folder):
-            files, faults = self._write_pictures(shooting, policy, numbering, focal_mm or {})
+            files, faults = self._write_pictures(captured, policy, numbering, focal_mm or {})
             seconds = time.monotonic() - began
             if seconds > SLOW_S:
                 faults.append(_slow(files, seconds))
             record = make_record(
-                shooting,
+                captured,
                 evidence,
                 files,
                 numbering,
                 partial_allowed=partial_allowed,
                 more_faults=faults,
             )
-            books = session.books
-            staged = self._folder / places.STAGED_RECORD
-            books.disk.replace(staged, model_bytes(record), books.scratch)
-            session.books = publish(books, record)
+            index = session.index
+            staged = self._folder / paths.STAGED_RECORD
+            index.disk.replace(staged, model_bytes(record), index.scratch)
+            session.index = publish(index, record)
         return record
 
     def _write_pictures(
         self,
-        shooting: Shooting,
+        captured: CaptureData,
         policy: CapturePolicy,
         numbering: Numbering,
         focal_mm: Mapping[str, float],
@@ -121,15 +121,15 @@ class Stage:
         def write(one: tuple[CameraPart, Pair, bool]) -> tuple[FiledFrame, bool]:
             part, pair, raw = one
             name, instant = part.plan.name, numbering.first_instant + pair.shot - 1
-            facts = picture_facts(shooting, part, pair, focal_mm.get(name))
+            facts = picture_facts(captured, part, pair, focal_mm.get(name))
             file = filed(pair.frame, facts, policy)
-            path = places.picture(name, instant, file.suffix, raw=raw)
+            path = paths.picture(name, instant, file.suffix, raw=raw)
             self._write(path, file.data)
             done = FiledFrame(part, pair, raw, entry(path, file.data), file.media_type)
             return done, file.as_png
 
         with ThreadPoolExecutor(self._writers, "capture-writer") as pool:
-            written = list(pool.map(write, _pictures(shooting)))
+            written = list(pool.map(write, _pictures(captured)))
         faults = [
             Fault(
                 FaultKind.FILED_AS_PNG,
@@ -144,15 +144,15 @@ class Stage:
         return [one for one, _ in written], faults
 
     def _write(self, path: str, data: bytes) -> None:
-        disk, target = self._session.books.disk, self._folder / path
+        disk, target = self._session.index.disk, self._folder / path
         disk.make_folder(target.parent)
         disk.write(target, data)
         disk.sync_folder(target.parent)
 
 
-def _pictures(shooting: Shooting) -> Iterator[tuple[CameraPart, Pair, bool]]:
+def _pictures(captured: CaptureData) -> Iterator[tuple[CameraPart, Pair, bool]]:
     """All pictures and the raw files beside them, each with whether it is one."""
-    for part in shooting.parts:
+    for part in captured.parts:
         beside = () if part.raws is None else part.raws.pairs
         for pair in (*part.pairing.pairs, *beside):
             yield part, pair, is_raw(pair.frame)
@@ -165,16 +165,16 @@ def _slow(files: list[FiledFrame], seconds: float) -> Fault:
 
 
 def picture_facts(
-    shooting: Shooting, part: CameraPart, pair: Pair, focal_mm: float | None
+    captured: CaptureData, part: CameraPart, pair: Pair, focal_mm: float | None
 ) -> PictureFacts:
     """What EXIF says of one picture."""
-    told = next((i.at_host_ns for i in part.take.instants if i.shot == pair.shot), None)
-    at = pair.exposed_host_ns or told or shooting.fired_host_ns
-    later = timedelta(microseconds=(at - shooting.fired_host_ns) / 1000.0)
+    told = next((i.at_host_ns for i in part.received.trigger_times if i.shot == pair.shot), None)
+    at = pair.exposed_host_ns or told or captured.fired_host_ns
+    later = timedelta(microseconds=(at - captured.fired_host_ns) / 1000.0)
     settings = part.settings
     return PictureFacts(
-        unique_id=f"{shooting.capture_id}/{part.plan.name}/{pair.shot}",
-        taken_at=shooting.fired_at + later,
+        unique_id=f"{captured.capture_id}/{part.plan.name}/{pair.shot}",
+        taken_at=captured.fired_at + later,
         make=part.info.vendor,
         model=part.info.model,
         serial_number=part.info.id,

@@ -8,7 +8,7 @@ import json
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from rig.acquisition.session.places import FRAMES_TABLE, SYNC_CHECK, TRIGGER_LOG
+from rig.acquisition.session.paths import FRAMES_TABLE, SYNC_CHECK, TRIGGER_LOG
 from rig.acquisition.session.records import CaptureRecord, FrameEntry
 
 SYNC_SCHEMA = "rigwright.sync/1"
@@ -50,7 +50,7 @@ TIMING = (
 
 
 @dataclass(frozen=True)
-class Part:
+class TableRows:
     """What one capture adds to each table."""
 
     frames: bytes
@@ -58,23 +58,23 @@ class Part:
     sync: bytes
 
 
-def part_of(record: CaptureRecord) -> Part:
+def rows_of(record: CaptureRecord) -> TableRows:
     """The rows and lines of one capture."""
-    return Part(_frames(record), _trigger(record), _sync(record))
+    return TableRows(_frames(record), _trigger(record), _sync(record))
 
 
 def tables(records: Sequence[CaptureRecord]) -> dict[str, bytes]:
     """All tables by path, of the committed captures in their order."""
-    return joined([part_of(record) for record in records])
+    return joined([rows_of(record) for record in records])
 
 
-def joined(parts: Sequence[Part]) -> dict[str, bytes]:
-    """All tables by path, of parts that are made already: a long session is not made anew."""
+def joined(rows: Sequence[TableRows]) -> dict[str, bytes]:
+    """All tables by path, of rows that are made already: a long session is not made anew."""
     head = f'{{"schema": "{SYNC_SCHEMA}", "captures": [\n'.encode()
     return {
-        FRAMES_TABLE: b"".join([_csv([COLUMNS]), *(part.frames for part in parts)]),
-        TRIGGER_LOG: b"".join(part.trigger for part in parts),
-        SYNC_CHECK: head + b",\n".join(part.sync for part in parts) + b"\n]}\n",
+        FRAMES_TABLE: b"".join([_csv([COLUMNS]), *(one.frames for one in rows)]),
+        TRIGGER_LOG: b"".join(one.trigger for one in rows),
+        SYNC_CHECK: head + b",\n".join(one.sync for one in rows) + b"\n]}\n",
     }
 
 

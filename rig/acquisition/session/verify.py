@@ -11,15 +11,14 @@ from enum import StrEnum
 from pathlib import Path
 
 from common.errors import InputError
-from rig.acquisition.session import places
-from rig.acquisition.session.commit import Books
+from rig.acquisition.session import paths
+from rig.acquisition.session.index import SessionIndex, read_index
 from rig.acquisition.session.records import CaptureEntry, CaptureRecord, FileEntry
-from rig.acquisition.session.recovery import read_books
 from rig.acquisition.session.storage import Disk, file_sha256, sha256
 from rig.acquisition.session.tables import tables
 
 
-class FindingKind(StrEnum):
+class SessionFindingKind(StrEnum):
     """What can be wrong with a session."""
 
     DAMAGED = "damaged"
@@ -33,10 +32,10 @@ class FindingKind(StrEnum):
 
 
 @dataclass(frozen=True)
-class Finding:
+class SessionFinding:
     """One thing that is wrong, and with which file."""
 
-    kind: FindingKind
+    kind: SessionFindingKind
     path: str
     text: str
 
@@ -45,7 +44,7 @@ class Finding:
 class SessionCheck:
     """The result: whole when nothing was found."""
 
-    findings: tuple[Finding, ...]
+    findings: tuple[SessionFinding, ...]
     captures: int = 0
     files: int = 0
     bytes: int = 0
@@ -62,67 +61,69 @@ def verify_session(folder: Path) -> SessionCheck:
     Raises :class:`NotFoundError` where there is no session.
     """
     try:
-        books = read_books(folder, Disk())
+        index = read_index(folder, Disk())
     except InputError as error:
-        return SessionCheck((Finding(FindingKind.DAMAGED, places.SESSION, error.problem),))
-    listed = list(_listed(books))
+        return SessionCheck(
+            (SessionFinding(SessionFindingKind.DAMAGED, paths.SESSION, error.problem),)
+        )
+    listed = list(_listed(index))
     findings = [
         *_files(folder, listed),
-        *_tables(books),
-        *_contradictions(books),
+        *_tables(index),
+        *_contradictions(index),
         *_extras(folder, {entry.path for entry in listed}),
     ]
     size = sum(entry.bytes for entry in listed)
-    return SessionCheck(tuple(findings), len(books.records), len(listed) + 1, size)
+    return SessionCheck(tuple(findings), len(index.records), len(listed) + 1, size)
 
 
-def _listed(books: Books) -> Iterator[FileEntry]:
+def _listed(index: SessionIndex) -> Iterator[FileEntry]:
     """Every file the session knows, ``session.json`` itself aside."""
-    yield from books.manifest.rig
-    yield from books.manifest.tables
-    yield from (listed.record for listed in books.manifest.captures)
-    for record in books.records:
+    yield from index.manifest.rig
+    yield from index.manifest.tables
+    yield from (listed.record for listed in index.manifest.captures)
+    for record in index.records:
         yield from (frame.file for frame in record.frames)
 
 
-def _files(folder: Path, listed: Iterable[FileEntry]) -> Iterator[Finding]:
+def _files(folder: Path, listed: Iterable[FileEntry]) -> Iterator[SessionFinding]:
     for entry in listed:
         path = folder / entry.path
         if path.is_symlink() or not path.is_file():
-            yield Finding(FindingKind.MISSING, entry.path, f"{entry.path} is missing")
+            yield SessionFinding(SessionFindingKind.MISSING, entry.path, f"{entry.path} is missing")
         elif path.stat().st_size != entry.bytes or file_sha256(path) != entry.sha256:
             text = f"{entry.path} is not as it was written"
-            yield Finding(FindingKind.CHANGED, entry.path, text)
+            yield SessionFinding(SessionFindingKind.CHANGED, entry.path, text)
 
 
-def _tables(books: Books) -> Iterator[Finding]:
-    known = {entry.path: entry.sha256 for entry in books.manifest.tables}
-    for path, data in tables(books.records).items():
+def _tables(index: SessionIndex) -> Iterator[SessionFinding]:
+    known = {entry.path: entry.sha256 for entry in index.manifest.tables}
+    for path, data in tables(index.records).items():
         if known.get(path) != sha256(data):
             text = f"{path} does not say what the records of the captures say"
-            yield Finding(FindingKind.CONTRADICTION, path, text)
+            yield SessionFinding(SessionFindingKind.CONTRADICTION, path, text)
 
 
-def _contradictions(books: Books) -> Iterator[Finding]:
+def _contradictions(index: SessionIndex) -> Iterator[SessionFinding]:
     seen: dict[str, str] = {}
-    for listed, record in zip(books.manifest.captures, books.records, strict=True):
+    for listed, record in zip(index.manifest.captures, index.records, strict=True):
         path = listed.record.path
         if not _agree(listed, record):
             text = f"{path} and session.json contradict each other"
-            yield Finding(FindingKind.CONTRADICTION, path, text)
+            yield SessionFinding(SessionFindingKind.CONTRADICTION, path, text)
         for frame in record.frames:
             suffix = Path(frame.file.path).suffix
-            place = places.picture(frame.camera, frame.instant, suffix, raw=frame.raw)
+            place = paths.picture(frame.camera, frame.instant, suffix, raw=frame.raw)
             other = seen.setdefault(frame.file.path, record.capture_id)
             if place != frame.file.path or other != record.capture_id:
                 text = f"{frame.file.path} is not where a picture of its camera and instant lies"
-                yield Finding(FindingKind.CONTRADICTION, frame.file.path, text)
+                yield SessionFinding(SessionFindingKind.CONTRADICTION, frame.file.path, text)
 
 
 def _agree(listed: CaptureEntry, record: CaptureRecord) -> bool:
     same = ("capture_id", "number", "state", "fired_at", "first_instant", "shots", "verdict")
     pictures = sum(not frame.raw for frame in record.frames)
-    place = places.record(record.number, record.capture_id)
+    place = paths.record(record.number, record.capture_id)
     return (
         all(getattr(listed, key) == getattr(record, key) for key in same)
         and listed.pictures == pictures
@@ -130,14 +131,14 @@ def _agree(listed: CaptureEntry, record: CaptureRecord) -> bool:
     )
 
 
-def _extras(folder: Path, known: set[str]) -> Iterator[Finding]:
+def _extras(folder: Path, known: set[str]) -> Iterator[SessionFinding]:
     for path in sorted(folder.rglob("*")):
         name = path.relative_to(folder).as_posix()
         top = name.split("/", 1)[0]
-        if top == places.INTERRUPTED or (path.is_dir() and not path.is_symlink()):
+        if top == paths.INTERRUPTED or (path.is_dir() and not path.is_symlink()):
             continue
-        if top == places.INCOMPLETE:
+        if top == paths.INCOMPLETE:
             text = "a capture is being written, or was when the program was stopped"
-            yield Finding(FindingKind.INTERRUPTED, name, text)
-        elif name not in known and name != places.SESSION:
-            yield Finding(FindingKind.EXTRA, name, f"{name} belongs to no capture")
+            yield SessionFinding(SessionFindingKind.INTERRUPTED, name, text)
+        elif name not in known and name != paths.SESSION:
+            yield SessionFinding(SessionFindingKind.EXTRA, name, f"{name} belongs to no capture")

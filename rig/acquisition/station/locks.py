@@ -1,12 +1,10 @@
 """One owner per device: a second process is refused, and told who holds it.
 
-The locks are the kernel's (``flock``), so a process that dies lets go whatever it died of. What
-is written in a lock file is for people only.
+A lock file lies in one folder for all users of the computer, named after its device.
 """
 
 from __future__ import annotations
 
-import fcntl
 import hashlib
 import json
 import os
@@ -20,6 +18,7 @@ from types import TracebackType
 from typing import Self
 
 from common.errors import ConflictError, InputError
+from common.files.lock import KernelLock, LockHeldError, lock_file
 from rig.acquisition.station.spec import Station
 
 UNSHARED_BACKENDS = frozenset({"simulated"})
@@ -63,7 +62,7 @@ class DeviceLocks:
 
     def __init__(self, names: Iterable[str], folder: Path | None = None) -> None:
         self._folder = lock_folder() if folder is None else folder
-        self._held: list[int] = []
+        self._held: list[KernelLock] = []
         try:
             for name in names:
                 self._held.append(self._take(name))
@@ -71,45 +70,30 @@ class DeviceLocks:
             self.release()
             raise
 
-    def _take(self, name: str) -> int:
-        handle = self._open(name)
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            holder = os.pread(handle, 4096, 0)
-            os.close(handle)
-            raise ConflictError(
-                "device-busy",
-                f"the {name} is in use by {_who(holder)}",
-                "stop that first, or work through its service",
-            ) from None
-        os.ftruncate(handle, 0)
-        os.pwrite(handle, json.dumps(_me(), ensure_ascii=False).encode(), 0)
-        return handle
-
-    def _open(self, name: str) -> int:
+    def _take(self, name: str) -> KernelLock:
         try:
             if not self._folder.is_dir():
                 self._folder.mkdir(parents=True, exist_ok=True)
                 # Another user's process must be able to lock, and not to remove, files here.
                 self._folder.chmod(0o1777)
-            # A planted link must not make this process write into somebody's file.
-            flags = os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW
-            handle = os.open(self._folder / _file_name(name), flags, 0o666)
-            if os.fstat(handle).st_uid == os.getuid():
-                os.fchmod(handle, 0o666)
+            return lock_file(self._folder / _file_name(name), _me())
+        except LockHeldError as error:
+            raise ConflictError(
+                "device-busy",
+                f"the {name} is in use by {_who(error.holder)}",
+                "stop that first, or work through its service",
+            ) from None
         except OSError as error:
             raise InputError(
                 "locks-unwritable",
                 f"cannot lock the {name} in {self._folder} ({(error.strerror or '').lower()})",
                 "make that folder writable",
             ) from error
-        return handle
 
     def release(self) -> None:
-        """Let go of all. The files stay: removing one could take it from under a new holder."""
+        """Let go of all. Releasing twice changes nothing."""
         while self._held:
-            os.close(self._held.pop())
+            self._held.pop().release()
 
     def __enter__(self) -> Self:
         return self
@@ -128,11 +112,12 @@ def _file_name(name: str) -> str:
     return f"{readable}.{hashlib.sha256(name.encode()).hexdigest()[:12]}.lock"
 
 
-def _me() -> dict[str, object]:
-    return {"pid": os.getpid(), "host": platform.node(), "command": " ".join(sys.argv)[:300]}
+def _me() -> str:
+    me = {"pid": os.getpid(), "host": platform.node(), "command": " ".join(sys.argv)[:300]}
+    return json.dumps(me, ensure_ascii=False)
 
 
-def _who(text: bytes) -> str:
+def _who(text: str) -> str:
     try:
         holder = json.loads(text)
         return f"process {holder['pid']} on {holder['host']} ({holder['command']})"

@@ -41,7 +41,7 @@ def fit_clock(samples: Sequence[ClockSample]) -> DeviceClock | None:
     return model.fit()
 
 
-class InstantSource(StrEnum):
+class TriggerTimeSource(StrEnum):
     """How it is known when a camera was told to expose."""
 
     EDGE_LOG = "edge-log"
@@ -55,13 +55,13 @@ class InstantSource(StrEnum):
 
 
 @dataclass(frozen=True)
-class Instant:
+class TriggerTime:
     """When one camera was told to expose, on the host's clock, and how well that is known."""
 
     shot: int
     at_host_ns: int
     uncertainty_us: float
-    source: InstantSource
+    source: TriggerTimeSource
 
 
 def clock_jumped(samples: Sequence[ClockSample]) -> bool:

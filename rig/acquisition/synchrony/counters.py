@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 from rig.acquisition.cameras.base import CameraCapabilities
+from rig.acquisition.synchrony.cameraframes import CameraFrames, Pair
 from rig.acquisition.synchrony.faults import Fault, FaultKind
-from rig.acquisition.synchrony.take import Pair, Take
 
 
 def steps(capabilities: CameraCapabilities, first: int, second: int) -> int:
@@ -24,7 +24,7 @@ def steps(capabilities: CameraCapabilities, first: int, second: int) -> int:
 
 
 def counter_faults(
-    take: Take, pairs: Sequence[Pair], exposures: Sequence[int | None]
+    received: CameraFrames, pairs: Sequence[Pair], exposures: Sequence[int | None]
 ) -> list[Fault]:
     """What the counters add to pairs found by time stamps.
 
@@ -32,34 +32,34 @@ def counter_faults(
     ``pairs`` among them. A conflict means that counters and stamps contradict each other in
     their order, so that one of them lies.
     """
-    if not take.capabilities.frame_counter or any(c is None for c in exposures):
+    if not received.capabilities.frame_counter or any(c is None for c in exposures):
         return []
     values = [c for c in exposures if c is not None]
     shots = {pair.frame.counter: pair.shot for pair in pairs}
     faults = []
     for first, second in pairwise(values):
-        ahead = steps(take.capabilities, first, second)
+        ahead = steps(received.capabilities, first, second)
         if ahead <= 0:
-            return [_conflict(take, first, second)]
+            return [_conflict(received, first, second)]
         if ahead > 1:
-            faults.append(_gap(take, ahead - 1, shots.get(first), shots.get(second)))
+            faults.append(_gap(received, ahead - 1, shots.get(first), shots.get(second)))
     return faults
 
 
-def _conflict(take: Take, first: int, second: int) -> Fault:
+def _conflict(received: CameraFrames, first: int, second: int) -> Fault:
     return Fault(
         FaultKind.COUNTER_CONFLICT,
-        f"{take.camera}: the frame counter goes from {first} to {second} while the time stamps go "
-        "forward; no picture of this camera is given to a shot",
-        take.camera,
+        f"{received.camera}: the frame counter goes from {first} to {second} while the time "
+        "stamps go forward; no picture of this camera is given to a shot",
+        received.camera,
     )
 
 
-def _gap(take: Take, lost: int, before: int | None, after: int | None) -> Fault:
+def _gap(received: CameraFrames, lost: int, before: int | None, after: int | None) -> Fault:
     where = "" if before is None or after is None else f" between shots {before} and {after}"
     noun = "exposure was" if lost == 1 else "exposures were"
     return Fault(
         FaultKind.COUNTER_GAP,
-        f"{take.camera}: by the frame counter {lost} {noun} made{where} and lost on the way",
-        take.camera,
+        f"{received.camera}: by the frame counter {lost} {noun} made{where} and lost on the way",
+        received.camera,
     )

@@ -13,9 +13,9 @@ from enum import StrEnum
 from statistics import median
 
 from rig.acquisition.cameras.base import CameraCapabilities, TimestampKind, TriggerKind
-from rig.acquisition.synchrony.clocks import NS_PER_US, InstantSource
-from rig.acquisition.synchrony.shooting import CameraPart, Shooting
-from rig.acquisition.synchrony.take import Pair
+from rig.acquisition.synchrony.cameraframes import Pair
+from rig.acquisition.synchrony.capturedata import CameraPart, CaptureData
+from rig.acquisition.synchrony.clocks import NS_PER_US, TriggerTimeSource
 
 PTP_UNCERTAINTY_US = 10.0
 """What is claimed for PTP among cameras that do not say more (docs/explanation/capture.md)."""
@@ -78,7 +78,7 @@ class FrameTiming:
     skew_us: float
     skew_uncertainty_us: float
     exposure_us: float
-    source: InstantSource
+    source: TriggerTimeSource
 
 
 @dataclass(frozen=True)
@@ -131,9 +131,9 @@ def against(limit_us: float, value_us: float, uncertainty_us: float) -> Passed |
     return Passed.FAIL if abs(value_us) - uncertainty_us > limit_us else Passed.UNDECIDED
 
 
-def edge_evidence(shooting: Shooting) -> EdgeEvidence | None:
+def edge_evidence(captured: CaptureData) -> EdgeEvidence | None:
     """Level A; None when no box took part."""
-    report, request = shooting.report, shooting.request
+    report, request = captured.report, captured.request
     if report is None or request is None:
         return None
     errors = [
@@ -154,17 +154,17 @@ def edge_evidence(shooting: Shooting) -> EdgeEvidence | None:
     )
 
 
-def stamp_evidence(shooting: Shooting, limit_us: float) -> StampEvidence:
+def stamp_evidence(captured: CaptureData, limit_us: float) -> StampEvidence:
     """Level B for all cameras, with NaN for those whose stamps say nothing."""
     frames: list[FrameTiming] = []
     shots: list[ShotTiming] = []
-    for shot in range(1, shooting.shots + 1):
-        pairs = [(part, part.pairing.pair(shot)) for part in shooting.parts]
+    for shot in range(1, captured.shots + 1):
+        pairs = [(part, part.pairing.pair(shot)) for part in captured.parts]
         timed = [_timed(part, pair) for part, pair in pairs if pair is not None]
         if timed:
             shots.append(_shot_timing(shot, timed))
             frames += _frame_timings(shot, timed)
-    cameras = tuple(_camera_timing(part, frames, limit_us) for part in shooting.parts)
+    cameras = tuple(_camera_timing(part, frames, limit_us) for part in captured.parts)
     return StampEvidence(tuple(frames), tuple(shots), cameras)
 
 
@@ -185,7 +185,7 @@ def _timed(part: CameraPart, pair: Pair) -> _Timed:
     if pair.exposed_host_ns is not None:
         start, uncertainty = pair.exposed_host_ns / NS_PER_US, pair.uncertainty_us
         return _Timed(part, pair, start, uncertainty, exposure, False)
-    ptp = part.take.capabilities.timestamps is TimestampKind.PTP
+    ptp = part.received.capabilities.timestamps is TimestampKind.PTP
     if ptp and pair.frame.device_ns is not None:
         start = pair.frame.device_ns / NS_PER_US
         return _Timed(part, pair, start, PTP_UNCERTAINTY_US, exposure, True)
@@ -228,19 +228,21 @@ def _frame_timings(shot: int, timed: list[_Timed]) -> Iterable[FrameTiming]:
     centre = median(_at_us(t, middles) for t in known) if known else math.nan
     about = median(t.uncertainty_us for t in known) if len(known) > 1 else 0.0
     for t in timed:
-        instant = next(i for i in t.part.take.instants if i.shot == shot)
+        trigger_time = next(i for i in t.part.received.trigger_times if i.shot == shot)
         inside = t in known
-        lagged = inside and not t.ptp and instant.source is not InstantSource.NONE
-        lag = t.start_us - instant.at_host_ns / NS_PER_US if lagged else math.nan
+        lagged = inside and not t.ptp and trigger_time.source is not TriggerTimeSource.NONE
+        lag = t.start_us - trigger_time.at_host_ns / NS_PER_US if lagged else math.nan
         yield FrameTiming(
             camera=t.part.plan.name,
             shot=shot,
             lag_us=lag,
-            lag_uncertainty_us=t.uncertainty_us + instant.uncertainty_us if lagged else math.nan,
+            lag_uncertainty_us=t.uncertainty_us + trigger_time.uncertainty_us
+            if lagged
+            else math.nan,
             skew_us=_at_us(t, middles) - centre if inside else math.nan,
             skew_uncertainty_us=t.uncertainty_us + about if inside else math.nan,
             exposure_us=t.exposure_us,
-            source=instant.source,
+            source=trigger_time.source,
         )
 
 
@@ -251,7 +253,7 @@ def _camera_timing(part: CameraPart, frames: list[FrameTiming], limit_us: float)
     worst = max(skewed, key=lambda f: abs(f.skew_us), default=None)
     skew = math.nan if worst is None else worst.skew_us
     uncertainty = math.nan if worst is None else worst.skew_uncertainty_us
-    capabilities = part.take.capabilities
+    capabilities = part.received.capabilities
     return CameraTiming(
         camera=part.plan.name,
         sync_class=sync_class(capabilities, part.plan.output),

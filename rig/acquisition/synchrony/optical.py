@@ -13,8 +13,9 @@ from typing import Protocol
 
 from common.errors import InputError
 from rig.acquisition.cameras.base import Frame, Image
+from rig.acquisition.imaging import decoded
 from rig.acquisition.station.spec import Station
-from rig.acquisition.synchrony.shooting import CameraPart, Shooting
+from rig.acquisition.synchrony.capturedata import CameraPart, CaptureData
 
 SURE = 3.0
 """Standard deviations that count as the half width of a reading."""
@@ -78,12 +79,12 @@ class OpticalEvidence:
 
 
 def optical_evidence(
-    station: Station, shooting: Shooting, read: BoardReader, range_us: float
+    station: Station, captured: CaptureData, read: BoardReader, range_us: float
 ) -> OpticalEvidence:
     """Read the board in every picture. ``range_us``: when its counter begins again."""
     readings: list[FrameReading] = []
     unread: dict[str, str] = {}
-    for part in shooting.parts:
+    for part in captured.parts:
         for one in part.pairing.pairs:
             try:
                 found = _read(one.frame, part, read)
@@ -101,14 +102,10 @@ def _read(frame: Frame, part: CameraPart, read: BoardReader) -> ExposureReading:
         return read(frame.pixels, exposure)
     if frame.encoded is None:
         raise InputError("board-no-picture", "there is no picture", "take it again")
-    import cv2
-    import numpy as np
-
-    flags = cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
-    pixels = cv2.imdecode(np.frombuffer(frame.encoded, np.uint8), flags)
+    pixels = decoded(frame.encoded)
     if pixels is None:
         raise InputError("board-no-picture", "the picture cannot be decoded", "take it again")
-    return read(np.ascontiguousarray(pixels[:, :, ::-1]).astype(np.uint8), exposure)
+    return read(pixels, exposure)
 
 
 def _reading(

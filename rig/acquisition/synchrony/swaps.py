@@ -13,9 +13,9 @@ from itertools import combinations
 from statistics import median
 
 from rig.acquisition.station.spec import Station
+from rig.acquisition.synchrony.capturedata import CameraPart
 from rig.acquisition.synchrony.clocks import NS_PER_US
 from rig.acquisition.synchrony.faults import Fault, FaultKind
-from rig.acquisition.synchrony.shooting import CameraPart
 
 CLEAR_US = 500.0
 """Outputs whose delays differ by less cannot be told apart by cameras of ordinary jitter."""
@@ -44,16 +44,18 @@ def _lag_off_us(part: CameraPart) -> float:
 
     All stamped pictures count, those that pairing left out as too early or late as well.
     """
-    take = part.take
-    if take.clock is None or not take.instants:
+    received = part.received
+    if received.clock is None or not received.trigger_times:
         return math.nan
     times = sorted(
-        take.clock.host_ns(frame.device_ns) for frame in take.frames if frame.device_ns is not None
+        received.clock.host_ns(frame.device_ns)
+        for frame in received.frames
+        if frame.device_ns is not None
     )
-    if len(times) != len(take.instants):
+    if len(times) != len(received.trigger_times):
         return math.nan
     lags = [
-        (at - instant.at_host_ns) / NS_PER_US
-        for at, instant in zip(times, take.instants, strict=True)
+        (at - trigger_time.at_host_ns) / NS_PER_US
+        for at, trigger_time in zip(times, received.trigger_times, strict=True)
     ]
-    return median(lags) - take.lag_us
+    return median(lags) - received.lag_us

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from rig.acquisition.station.spec import Station
+from rig.acquisition.synchrony.capturedata import CaptureData
 from rig.acquisition.synchrony.evidence import (
     EdgeEvidence,
     Passed,
@@ -17,7 +18,6 @@ from rig.acquisition.synchrony.evidence import (
     stamp_evidence,
 )
 from rig.acquisition.synchrony.optical import BoardReader, OpticalEvidence, optical_evidence
-from rig.acquisition.synchrony.shooting import Shooting
 
 
 class SyncState(StrEnum):
@@ -73,49 +73,49 @@ class Board:
     range_us: float
 
 
-def gather(station: Station, shooting: Shooting, board: Board | None = None) -> Evidence:
+def gather(station: Station, captured: CaptureData, board: Board | None = None) -> Evidence:
     """All that a capture proves. ``board`` None: no timing board is looked for."""
     limit = station.policy.skew_limit_us
-    edges = edge_evidence(shooting)
-    stamps = stamp_evidence(shooting, limit)
+    edges = edge_evidence(captured)
+    stamps = stamp_evidence(captured, limit)
     optical = None
     if board is not None:
-        optical = optical_evidence(station, shooting, board.read, board.range_us)
-    return Evidence(edges, stamps, optical, judge(shooting, edges, stamps, optical, limit))
+        optical = optical_evidence(station, captured, board.read, board.range_us)
+    return Evidence(edges, stamps, optical, judge(captured, edges, stamps, optical, limit))
 
 
 def judge(
-    shooting: Shooting,
+    captured: CaptureData,
     edges: EdgeEvidence | None,
     stamps: StampEvidence,
     optical: OpticalEvidence | None,
     limit_us: float,
 ) -> Verdict:
     """The verdict by the best level that covers every picture that was taken."""
-    taken = {(p.plan.name, one.shot) for p in shooting.parts for one in p.pairing.pairs}
-    lacking = _lacking(shooting, stamps, optical)
+    taken = {(p.plan.name, one.shot) for p in captured.parts for one in p.pairing.pairs}
+    lacking = _lacking(captured, stamps, optical)
     if not taken:
         text = "no picture was taken"
         return Verdict(SyncState.UNPROVEN, Level.NONE, math.nan, limit_us, text, lacking)
     if optical is not None and taken == {(r.camera, r.shot) for r in optical.readings}:
         spread = (optical.spread_us, optical.spread_uncertainty_us)
-        return _decided(shooting, Level.OPTICAL, *spread, limit_us, lacking)
+        return _decided(captured, Level.OPTICAL, *spread, limit_us, lacking)
     if taken == {(f.camera, f.shot) for f in stamps.frames if math.isfinite(f.skew_us)}:
         worst = max(stamps.shots, key=lambda s: s.spread_us + s.spread_uncertainty_us)
         spread = (worst.spread_us, worst.spread_uncertainty_us)
-        return _decided(shooting, Level.STAMPS, *spread, limit_us, lacking)
+        return _decided(captured, Level.STAMPS, *spread, limit_us, lacking)
     return _unproven(edges, stamps, limit_us, lacking)
 
 
 def _decided(
-    shooting: Shooting,
+    captured: CaptureData,
     level: Level,
     spread_us: float,
     uncertainty_us: float,
     limit_us: float,
     lacking: tuple[str, ...],
 ) -> Verdict:
-    if len([p for p in shooting.parts if p.pairing.pairs]) < 2:
+    if len([p for p in captured.parts if p.pairing.pairs]) < 2:
         text = "one camera alone: there is nothing to be synchronised with"
         return Verdict(SyncState.SYNCHRONISED, level, 0.0, limit_us, text, lacking)
     passed = against(limit_us, spread_us, uncertainty_us)
@@ -148,10 +148,10 @@ def _unproven(
 
 
 def _lacking(
-    shooting: Shooting, stamps: StampEvidence, optical: OpticalEvidence | None
+    captured: CaptureData, stamps: StampEvidence, optical: OpticalEvidence | None
 ) -> tuple[str, ...]:
     missing = []
-    if not (shooting.report is not None and shooting.report.edges):
+    if not (captured.report is not None and captured.report.edges):
         missing.append("A: no edge log of a trigger box")
     dumb = sorted({f.camera for f in stamps.frames if not math.isfinite(f.skew_us)})
     if dumb:

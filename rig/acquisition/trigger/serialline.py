@@ -7,7 +7,6 @@ does.
 
 from __future__ import annotations
 
-import fcntl
 import hashlib
 import os
 import re
@@ -21,6 +20,7 @@ from pathlib import Path
 import serial
 
 from common.errors import DeviceError
+from common.files.lock import LockHeldError, lock_file
 
 LINE_ERRORS = (serial.SerialException, OSError, TypeError)
 """What pyserial raises when a port goes: its own error, plain OSError from ``in_waiting``, and
@@ -45,7 +45,7 @@ def is_device_path(url: str) -> bool:
 
 
 class PortLock:
-    """The kernel's lock on a port, by name: a process that dies lets go.
+    """The lock on a port, by name.
 
     Raises :class:`~common.errors.DeviceError` ``device/trigger-busy`` that says who holds it.
     """
@@ -56,38 +56,19 @@ class PortLock:
         real = os.path.realpath(name) if is_device_path(url) else name
         digest = hashlib.sha256(real.encode()).hexdigest()[:16]
         path = Path(tempfile.gettempdir()) / f"rigwright-trigger-{digest}.lock"
-        self._handle = _lock_file(path)
+        program = Path(sys.argv[0]).name or "python"
         try:
-            fcntl.flock(self._handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            holder = os.pread(self._handle, 200, 0).decode(errors="replace").strip()
-            os.close(self._handle)
+            self._lock = lock_file(path, f"process {os.getpid()} ({program})\n")
+        except LockHeldError as error:
             raise DeviceError(
                 "trigger-busy",
-                f"the trigger box at {name} is held by {holder or 'another program'}",
+                f"the trigger box at {name} is held by {error.holder or 'another program'}",
                 "end that program, or let it do the work",
             ) from None
-        os.ftruncate(self._handle, 0)
-        program = Path(sys.argv[0]).name or "python"
-        os.pwrite(self._handle, f"process {os.getpid()} ({program})\n".encode(), 0)
 
     def release(self) -> None:
         """Let go."""
-        os.close(self._handle)
-
-
-def _lock_file(path: Path) -> int:
-    """The file, for all users.
-
-    A kernel that protects shared folders lets nobody create over another's file, only open it.
-    """
-    while True:
-        with suppress(FileNotFoundError):
-            return os.open(path, os.O_RDWR | os.O_CLOEXEC)
-        with suppress(FileExistsError):
-            handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC)
-            os.fchmod(handle, 0o666)
-            return handle
+        self._lock.release()
 
 
 class SerialLine:

@@ -17,7 +17,7 @@ def cameras(as_json: JsonOption = False) -> None:
 
 def run_cameras_command(*, as_json: bool) -> None:
     """List what can be reached."""
-    from rig.acquisition.cameras.registry import discover_all
+    from rig.devices.registry import discover_all
     from service.cli.output import print_json
     from service.cli.running import one_line_errors
 

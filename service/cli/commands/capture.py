@@ -86,8 +86,8 @@ def run_capture_command(
     station: Path, folder: Path | None, asked: Asked, *, dry_run: bool, as_json: bool
 ) -> None:
     """Take one capture, or rehearse it."""
-    from rig.acquisition.capture.rig import open_station
     from rig.acquisition.station.stationfile import read_station
+    from rig.devices.station import open_station
     from service.cli.output import show
     from service.cli.progress import show_progress, told
     from service.cli.running import cancel_on_signal, one_line_errors

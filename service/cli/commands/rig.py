@@ -40,9 +40,9 @@ def rig_check(
 
 def run_rig_check_command(station: Path, captures: int, *, write: bool, as_json: bool) -> None:
     """Self-test, then the synchronisation, as far as the devices are well."""
-    from rig.acquisition.capture.rig import open_station
     from rig.acquisition.station.delays import write_timings
     from rig.acquisition.station.stationfile import read_station
+    from rig.devices.station import open_station
     from service.cli.output import NOT_WELL, print_json
     from service.cli.progress import show_progress, told
     from service.cli.running import cancel_on_signal, one_line_errors

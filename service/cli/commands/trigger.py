@@ -104,9 +104,9 @@ def run_trigger_reset_command(url: str | None, station: Path | None) -> None:
 @contextmanager
 def _open_box(url: str | None, station: Path | None) -> Iterator[TriggerBox]:
     from common.errors import InputError
-    from rig.acquisition.capture.devices import StationDevices
     from rig.acquisition.station.spec import TriggerPlan
     from rig.acquisition.station.stationfile import read_station
+    from rig.devices.station import StationDevices
 
     if (url is None) == (station is None):
         raise InputError("box", "no box, or two, were named", "give --url or --station")

@@ -22,8 +22,8 @@ from rig.acquisition.cameras.base import (
     FrameStatus,
     TriggerKind,
 )
-from rig.acquisition.cameras.registry import make_backend
 from rig.acquisition.cameras.remotecamera import RemoteCamera
+from rig.devices.registry import make_backend
 
 pytestmark = pytest.mark.needs_aravis
 

@@ -9,7 +9,7 @@ import pytest
 
 from common.files.strict import StrictModel, keys_of
 from rig.acquisition.cameras import aravis, folder, genicam, gphoto2, opencv
-from rig.acquisition.cameras.registry import BACKENDS
+from rig.devices.registry import BACKENDS, SIMULATED
 
 ROOT = Path(__file__).resolve().parents[4]
 PAGE = (ROOT / "docs" / "how-to" / "cameras.md").read_text(encoding="utf-8")
@@ -28,7 +28,7 @@ MODELS: dict[str, type[StrictModel]] = {
 
 def test_every_backend_has_its_row() -> None:
     rows = re.findall(r"^\| `(\w+)` \|", PAGE.split("## One process")[0], re.MULTILINE)
-    assert rows == list(BACKENDS)
+    assert rows == [SIMULATED, *BACKENDS]
 
 
 @pytest.mark.parametrize("name", MODELS)

@@ -9,14 +9,14 @@ from camera_rigs import jpeg
 
 from common.errors import DeviceError, InputError
 from rig.acquisition.cameras.options import require
-from rig.acquisition.cameras.registry import BACKENDS, ON_THEIR_OWN, discover_all, make_backend
+from rig.devices.registry import BACKENDS, ON_THEIR_OWN, discover_all, make_backend
 
 ROOT = Path(__file__).resolve().parents[4]
 
 
 def test_asking_for_a_backend_imports_no_other_ones_library() -> None:
     code = (
-        "import sys, rig.acquisition.cameras.registry as registry\n"
+        "import sys, rig.devices.registry as registry\n"
         "before = set(sys.modules)\n"
         "assert not before & {'cv2', 'genicam', 'gphoto2', 'gi', 'exifread'}, before\n"
         "registry.make_backend('folder', {'root': '.'})\n"
@@ -31,7 +31,7 @@ def test_an_unknown_backend_is_named_with_those_there_are() -> None:
     assert caught.value.code == "input/camera-backend"
 
 
-@pytest.mark.parametrize("name", [name for name in BACKENDS if name != "simulated"])
+@pytest.mark.parametrize("name", BACKENDS)
 def test_an_unknown_option_is_named_with_those_there_are(name: str) -> None:
     with pytest.raises(
         InputError, match=rf"'wrong' of the {name} cameras.*its options are"

@@ -14,7 +14,7 @@ from PIL import Image
 
 from rig.acquisition.cameras.base import Frame, FrameStatus
 from rig.acquisition.session.verify import verify_session
-from rig.acquisition.synchrony.looks import look_at
+from rig.acquisition.synchrony.imagechecks import check_image
 
 SHOTS = 3
 BAD = frozenset({2})
@@ -186,4 +186,4 @@ def test_what_counts_as_black(level: int, dtype: type, black: bool) -> None:
     """A dark frame's noise does, a face in poor light does not."""
     noise = np.random.default_rng(3).normal(level, level / 8.0, (120, 160))
     frame = Frame("SN", 0, FrameStatus.OK, pixels=noise.clip(0).astype(dtype))
-    assert look_at(frame).black == black
+    assert check_image(frame).black == black

@@ -25,7 +25,7 @@ from memoryrig import (
 from common.errors import CancelledError, ConflictError, DeviceError, InputError, InterlockError
 from common.progress import Progress
 from rig.acquisition.cameras.base import TimestampKind, TriggerKind
-from rig.acquisition.capture.rig import open_station
+from rig.acquisition.capture.rig import Rig
 from rig.acquisition.session.naming import BOX_ID_LENGTH
 from rig.acquisition.session.verify import verify_session
 from rig.acquisition.station.spec import Interlock, TriggerPlan
@@ -384,7 +384,7 @@ def test_a_session_is_continued_with_its_own_rig_only(bench: BenchMaker) -> None
 def test_a_second_process_is_refused_in_one_sentence(bench: BenchMaker) -> None:
     bench()
     with pytest.raises(ConflictError, match=r"trigger box memory: is in use by process \d+ on "):
-        open_station(memory_station(), MemoryDevices(), locks=bench.folder / "locks", fit=line_fit)
+        Rig(memory_station(), MemoryDevices(), locks=bench.folder / "locks", fit=line_fit)
 
 
 def test_a_box_that_is_gone_leaves_nothing_open(tmp_path: Path) -> None:
@@ -392,7 +392,7 @@ def test_a_box_that_is_gone_leaves_nothing_open(tmp_path: Path) -> None:
     for _ in range(2):
         # Twice: the first failure let go of its locks.
         with pytest.raises(DeviceError, match="does not answer"):
-            open_station(memory_station(), devices, locks=tmp_path, fit=line_fit)
+            Rig(memory_station(), devices, locks=tmp_path, fit=line_fit)
     assert devices.closed
 
 
@@ -400,7 +400,7 @@ def test_a_station_without_one_camera_is_refused(tmp_path: Path) -> None:
     scripts = {f"cam{k:02d}": CameraScript(not_ready="absent") for k in (1, 2, 3)}
     devices = MemoryDevices(scripts)
     with pytest.raises(DeviceError, match="no camera could be opened"):
-        open_station(memory_station(), devices, locks=tmp_path, fit=line_fit)
+        Rig(memory_station(), devices, locks=tmp_path, fit=line_fit)
     assert devices.closed and devices.box.closed
 
 

@@ -14,16 +14,17 @@ import pytest
 from common.errors import InputError
 from geometry.camera import RigCamera
 from geometry.frames import Pose
-from rig.acquisition.capture.rig import Rig, open_station
+from rig.acquisition.capture.rig import Rig
 from rig.acquisition.session.verify import verify_session
 from rig.acquisition.station.delays import write_timings
-from rig.acquisition.station.simulation import simulation_settings
 from rig.acquisition.station.stationfile import read_station
 from rig.design.designfile import placed_camera
+from rig.devices.simulated import simulation_settings
+from rig.devices.station import open_station
 from rig.specification.examples import example_rig
 
 pytest.importorskip("rig.simulation.backend")
-pytest.importorskip("rig.acquisition.cameras.registry")
+pytest.importorskip("rig.devices.registry")
 pytest.importorskip("rig.acquisition.trigger.driver")
 
 STATION = """

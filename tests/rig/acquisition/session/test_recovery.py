@@ -15,9 +15,9 @@ from memorybench import Bench, BenchMaker
 from memoryrig import memory_station, with_policy
 
 from common.errors import ConflictError, InputError, NotFoundError, RigwrightError
-from rig.acquisition.session import places
+from rig.acquisition.session import paths
 from rig.acquisition.session.folder import Session, SessionPlan, session_folder
-from rig.acquisition.session.recovery import Recovery, recover
+from rig.acquisition.session.recovery import Recovery
 from rig.acquisition.session.storage import Disk
 from rig.acquisition.session.verify import verify_session
 
@@ -54,8 +54,8 @@ def after_a_stop(made: Bench) -> tuple[Session, int]:
     made.session = session
     check = verify_session(session.folder)
     assert check.whole, check.findings
-    assert not (session.folder / places.INCOMPLETE).exists()
-    ids = [record.capture_id for record in session.books.records]
+    assert not (session.folder / paths.INCOMPLETE).exists()
+    ids = [record.capture_id for record in session.index.records]
     assert ids[0] == "one"
     return session, len(ids)
 
@@ -192,24 +192,27 @@ def test_a_file_system_that_is_really_full(bench: BenchMaker, tiny_disk: Path) -
     session = Session.open(made.session.folder)
     made.session = session
     assert verify_session(session.folder).whole
-    assert len(session.books.records) in (taken, taken + 1)
+    assert len(session.index.records) in (taken, taken + 1)
     assert made.rig.capture(session, "after").record.state == "complete"
     session.close()
 
 
-def test_an_interrupted_session_can_be_recovered_by_hand(bench: BenchMaker, steps: int) -> None:
+def test_opening_an_interrupted_session_brings_it_in_order_once(
+    bench: BenchMaker, steps: int
+) -> None:
     disk = FaultyDisk()
     made = bench(QUICK, disk=disk)
     made.rig.capture(made.session, "one")
     stopped_at(made, disk, steps // 2)
     with pytest.raises(ConflictError, match="another process works on the session"):
-        recover(made.session.folder)
+        Session.open(made.session.folder)
     made.session.close()
     found = verify_session(made.session.folder)
     assert "interrupted" in {finding.kind.value for finding in found.findings}
-    done = recover(made.session.folder)
-    assert done.committed or done.set_aside
-    assert recover(made.session.folder) == Recovery()
+    with Session.open(made.session.folder) as session:
+        assert session.recovery.committed or session.recovery.set_aside
+    with Session.open(made.session.folder) as session:
+        assert session.recovery == Recovery()
     assert verify_session(made.session.folder).whole
 
 
@@ -221,10 +224,10 @@ def test_a_staged_capture_with_a_damaged_picture_is_put_aside(
     made = bench(QUICK, disk=disk)
     made.rig.capture(made.session, "one")
     for step in range(steps):
-        stage = places.stage(made.session.folder, "two")
+        stage = paths.stage(made.session.folder, "two")
         stopped_at(made, disk, step)
         pictures = list(stage.rglob("*.jpg"))
-        if (stage / places.STAGED_RECORD).exists() and len(pictures) == 2:
+        if (stage / paths.STAGED_RECORD).exists() and len(pictures) == 2:
             break
         made.session.close()
         shutil.rmtree(stage, ignore_errors=True)
@@ -233,7 +236,7 @@ def test_a_staged_capture_with_a_damaged_picture_is_put_aside(
     made.session.close()
     session = Session.open(made.session.folder)
     assert session.recovery.set_aside == ("two",)
-    assert [record.capture_id for record in session.books.records] == ["one"]
+    assert [record.capture_id for record in session.index.records] == ["one"]
     assert verify_session(session.folder).whole
     session.close()
 

@@ -21,11 +21,11 @@ from PIL.ExifTags import IFD, Base
 
 from common.errors import InputError
 from rig.acquisition.cameras.base import Frame, FrameStatus
-from rig.acquisition.session import places
+from rig.acquisition.session import paths
 from rig.acquisition.session.exif import PictureFacts, with_exif
 from rig.acquisition.session.pictures import filed
 from rig.acquisition.session.tables import tables
-from rig.acquisition.session.verify import FindingKind, verify_session
+from rig.acquisition.session.verify import SessionFindingKind, verify_session
 from rig.acquisition.station.spec import CapturePolicy, ImageFormat
 from rig.acquisition.synchrony.faults import HARMLESS, FaultKind
 from rig.design.designfile import design_document
@@ -155,12 +155,12 @@ def test_a_whole_session_is_whole_wherever_it_is_copied(shot: Bench, tmp_path: P
 
 
 def test_everything_that_can_happen_to_a_copy_is_found(shot: Bench, tmp_path: Path) -> None:
-    picture, kind = "images/rig1/cam02/000002.jpg", FindingKind
+    picture, kind = "images/rig1/cam02/000002.jpg", SessionFindingKind
 
     def flip(data: bytes) -> bytes:
         return data[:-1] + bytes([data[-1] ^ 1])
 
-    harm: list[tuple[str, Callable[[Path], object], FindingKind, str]] = [
+    harm: list[tuple[str, Callable[[Path], object], SessionFindingKind, str]] = [
         ("bit", lambda f: spoil(f, picture, flip), kind.CHANGED, picture),
         ("cut", lambda f: spoil(f, picture, lambda d: d[:-9]), kind.CHANGED, picture),
         ("gone", lambda f: (f / picture).unlink(), kind.MISSING, picture),
@@ -211,7 +211,7 @@ def test_two_captures_swapped_by_hand_contradict_the_manifest(shot: Bench) -> No
     swapped = [one.model_copy(update={"record": two.record}), two]
     path.write_bytes(model_bytes(signed(manifest.model_copy(update={"captures": swapped}))))
     kinds = {finding.kind for finding in verify_session(shot.session.folder).findings}
-    assert FindingKind.CONTRADICTION in kinds
+    assert SessionFindingKind.CONTRADICTION in kinds
 
 
 def test_a_manifest_cannot_point_out_of_its_folder(shot: Bench) -> None:
@@ -222,12 +222,12 @@ def test_a_manifest_cannot_point_out_of_its_folder(shot: Bench) -> None:
         document["rig"][0]["path"] = evil
         path.write_text(json.dumps(document))
         (finding,) = verify_session(shot.session.folder).findings
-        assert finding.kind is FindingKind.DAMAGED
+        assert finding.kind is SessionFindingKind.DAMAGED
         assert "rig[0].path" in finding.text
 
 
 def test_tables_are_made_of_the_records_alone(shot: Bench) -> None:
-    made = tables(shot.session.books.records)
+    made = tables(shot.session.index.records)
     for path, data in made.items():
         assert (shot.session.folder / path).read_bytes() == data
 
@@ -245,7 +245,7 @@ def test_pictures_carry_their_own_serial_number(shot: Bench) -> None:
 
 
 def test_burst_pictures_are_dated_by_their_own_instant(shot: Bench) -> None:
-    record = shot.session.books.records[0]
+    record = shot.session.index.records[0]
     stamps = []
     for instant in (1, 2):
         path = shot.session.folder / f"images/rig1/cam01/{instant:06d}.jpg"
@@ -260,17 +260,17 @@ def test_burst_pictures_are_dated_by_their_own_instant(shot: Bench) -> None:
 def test_files_follow_their_schemas(shot: Bench) -> None:
     docs = Path(__file__).resolve().parents[4] / "docs/reference"
     folder = shot.session.folder
-    for name, paths in (
+    for name, files in (
         ("session.schema.json", [folder / "session.json"]),
         ("capture.schema.json", sorted((folder / "captures").iterdir())),
     ):
         schema = json.loads((docs / name).read_text())
         jsonschema.Draft202012Validator.check_schema(schema)
-        assert paths
-        for path in paths:
+        assert files
+        for path in files:
             jsonschema.validate(json.loads(path.read_text()), schema)
         with pytest.raises(jsonschema.ValidationError, match="sujbect"):
-            jsonschema.validate({**json.loads(paths[0].read_text()), "sujbect": 1}, schema)
+            jsonschema.validate({**json.loads(files[0].read_text()), "sujbect": 1}, schema)
 
 
 @pytest.fixture
@@ -315,7 +315,7 @@ def test_a_design_travels_with_its_session(designed: Bench, small: Design) -> No
         calibration["cameras"][0]["camera_matrix"]
         == design.cameras[0].camera.camera_matrix.tolist()
     )
-    assert all(r.state == "complete" for r in designed.session.books.records)
+    assert all(r.state == "complete" for r in designed.session.index.records)
     assert verify_session(folder).whole
 
 
@@ -376,5 +376,5 @@ def test_the_page_names_every_fault_and_place() -> None:
     for kind in FaultKind:
         assert kind.value in rows, f"docs/explanation/capture.md does not tell {kind.value}"
         assert bool(rows[kind.value]) == (kind in HARMLESS)
-    for place in (*places.TABLES, places.SESSION, places.INCOMPLETE, places.INTERRUPTED):
+    for place in (*paths.TABLES, paths.SESSION, paths.INCOMPLETE, paths.INTERRUPTED):
         assert place in text

@@ -26,11 +26,11 @@ from rig.acquisition.cameras.base import (
 )
 from rig.acquisition.station.pulses import arm_request
 from rig.acquisition.station.spec import LightPlan, Station
-from rig.acquisition.synchrony.clocks import Instant, InstantSource, clock_jumped
+from rig.acquisition.synchrony.cameraframes import CameraFrames, Method, Pair, Pairing
+from rig.acquisition.synchrony.capturedata import CameraPart, CaptureData
+from rig.acquisition.synchrony.clocks import TriggerTime, TriggerTimeSource, clock_jumped
 from rig.acquisition.synchrony.evidence import Passed, against, stamp_evidence, sync_class
 from rig.acquisition.synchrony.lags import estimate_lags, new_timings
-from rig.acquisition.synchrony.shooting import CameraPart, Shooting
-from rig.acquisition.synchrony.take import Method, Pair, Pairing, Take
 from rig.acquisition.synchrony.verdict import Board, Level, SyncState, gather
 from rig.acquisition.trigger.box import Edge, FireOutcome, FireReport
 
@@ -40,13 +40,13 @@ MUTE = CameraCapabilities(TriggerKind.EDGE, TimestampKind.NONE, False)
 PTP = CameraCapabilities(TriggerKind.EDGE, TimestampKind.PTP, True)
 
 
-def shooting(
+def captured(
     station: Station,
     lags_us: Sequence[Sequence[float]],
     exposure_us: float | None = 4000.0,
     half_us: float = 10.0,
     capabilities: CameraCapabilities = DEVICE,
-) -> Shooting:
+) -> CaptureData:
     """Captures as pairing leaves them, with these lags by camera and shot."""
     shots = len(lags_us[0])
     request = arm_request(station, station.cameras, "box", shots, 50_000.0)
@@ -58,31 +58,33 @@ def shooting(
     report = FireReport("box", FireOutcome.FIRED, shots, shots, edges, 5.0)
     parts = []
     for plan, lags in zip(station.cameras, lags_us, strict=True):
-        instants = tuple(
-            Instant(e.shot, e.at_host_ns, 5.0, InstantSource.EDGE_LOG)
+        trigger_times = tuple(
+            TriggerTime(e.shot, e.at_host_ns, 5.0, TriggerTimeSource.EDGE_LOG)
             for e in report.rising_edges(plan.output or 0)
         )
         pairs = tuple(
             pair_of(plan.id, i, lag, exposure_us, half_us, capabilities)
-            for i, lag in zip(instants, lags, strict=True)
+            for i, lag in zip(trigger_times, lags, strict=True)
         )
-        take = Take(plan.name, capabilities, tuple(p.frame for p in pairs), instants, START)
+        received = CameraFrames(
+            plan.name, capabilities, tuple(p.frame for p in pairs), trigger_times, START
+        )
         info = CameraInfo(plan.id, "memory")
         pairing = Pairing(plan.name, pairs, ())
-        parts.append(CameraPart(plan, info, CameraSettings(), take, pairing))
+        parts.append(CameraPart(plan, info, CameraSettings(), received, pairing))
     now = datetime(2026, 11, 22, tzinfo=UTC)
-    return Shooting("c", shots, 5e4, now, START, request, report, shots, tuple(parts))
+    return CaptureData("c", shots, 5e4, now, START, request, report, shots, tuple(parts))
 
 
 def pair_of(
     camera: str,
-    instant: Instant,
+    trigger_time: TriggerTime,
     lag_us: float,
     exposure_us: float | None,
     half_us: float,
     capabilities: CameraCapabilities,
 ) -> Pair:
-    at = instant.at_host_ns + round(lag_us * 1000)
+    at = trigger_time.at_host_ns + round(lag_us * 1000)
     stamped = capabilities.timestamps is TimestampKind.DEVICE
     frame = Frame(
         camera,
@@ -92,13 +94,13 @@ def pair_of(
         exposure_us=exposure_us,
     )
     if stamped:
-        return Pair(instant.shot, frame, Method.TIMESTAMP, at, half_us)
-    return Pair(instant.shot, frame, Method.ARRIVAL)
+        return Pair(trigger_time.shot, frame, Method.TIMESTAMP, at, half_us)
+    return Pair(trigger_time.shot, frame, Method.ARRIVAL)
 
 
 def test_lags_and_skews_of_three_cameras() -> None:
     station = memory_station()
-    evidence = gather(station, shooting(station, [[100.0, 110.0], [200.0, 190.0], [900.0, 905.0]]))
+    evidence = gather(station, captured(station, [[100.0, 110.0], [200.0, 190.0], [900.0, 905.0]]))
     lags = {c.camera: c.lag_us for c in evidence.stamps.cameras}
     assert lags == pytest.approx({"cam01": 105.0, "cam02": 195.0, "cam03": 902.5})
     worst = {c.camera: c.skew_us for c in evidence.stamps.cameras}
@@ -127,7 +129,7 @@ def test_lags_and_skews_of_three_cameras() -> None:
 )
 def test_a_limit_is_kept_only_for_certain(limit: float, state: SyncState, passed: Passed) -> None:
     station = with_policy(memory_station(), skew_limit_us=limit)
-    evidence = gather(station, shooting(station, [[100.0], [200.0], [900.0]]))
+    evidence = gather(station, captured(station, [[100.0], [200.0], [900.0]]))
     assert evidence.verdict.state is state
     assert evidence.stamps.cameras[2].passed is passed
     assert evidence.stamps.cameras[1].passed is Passed.PASS
@@ -147,14 +149,14 @@ def test_pass_and_fail_are_both_certain(value: float, doubt: float, limit: float
 def test_middles_count_where_exposures_differ() -> None:
     """Two shutters that open together and close 2 ms apart are 1 ms apart in the middle."""
     station = memory_station(2)
-    shot = shooting(station, [[100.0], [100.0]])
+    shot = captured(station, [[100.0], [100.0]])
     long = shot.parts[1].pairing.pairs[0]
     longer = replace(long, frame=replace(long.frame, exposure_us=6000.0))
     pairing = replace(shot.parts[1].pairing, pairs=(longer,))
     mixed = replace(shot, parts=(shot.parts[0], replace(shot.parts[1], pairing=pairing)))
     (timing,) = stamp_evidence(mixed, 500.0).shots
     assert timing.spread_us == pytest.approx(1000.0) and timing.middles
-    unknown = gather(station, shooting(station, [[100.0], [150.0]], exposure_us=None))
+    unknown = gather(station, captured(station, [[100.0], [150.0]], exposure_us=None))
     (starts,) = unknown.stamps.shots
     assert starts.spread_us == pytest.approx(50.0) and not starts.middles
     assert math.isnan(starts.overlap_us)
@@ -162,7 +164,7 @@ def test_middles_count_where_exposures_differ() -> None:
 
 def test_level_a_alone_proves_nothing_of_the_cameras() -> None:
     station = memory_station()
-    evidence = gather(station, shooting(station, [[0.0]] * 3, capabilities=MUTE))
+    evidence = gather(station, captured(station, [[0.0]] * 3, capabilities=MUTE))
     assert evidence.edges is not None and evidence.edges.error_us == pytest.approx(0.5)
     assert (evidence.verdict.state, evidence.verdict.level) == (SyncState.UNPROVEN, Level.EDGES)
     assert "made its edges to 0.5 us" in evidence.verdict.text
@@ -171,7 +173,7 @@ def test_level_a_alone_proves_nothing_of_the_cameras() -> None:
 
 def test_without_an_edge_log_there_is_nothing() -> None:
     station = memory_station()
-    shot = shooting(station, [[0.0]] * 3, capabilities=MUTE)
+    shot = captured(station, [[0.0]] * 3, capabilities=MUTE)
     assert shot.report is not None
     evidence = gather(station, replace(shot, report=replace(shot.report, edges=())))
     assert (evidence.verdict.state, evidence.verdict.level) == (SyncState.UNPROVEN, Level.NONE)
@@ -180,7 +182,7 @@ def test_without_an_edge_log_there_is_nothing() -> None:
 
 def test_cameras_on_one_clock_are_compared_without_the_hosts() -> None:
     station = memory_station()
-    evidence = gather(station, shooting(station, [[0.0], [40.0], [90.0]], capabilities=PTP))
+    evidence = gather(station, captured(station, [[0.0], [40.0], [90.0]], capabilities=PTP))
     assert evidence.stamps.shots[0].spread_us == pytest.approx(90.0)
     assert all(math.isnan(c.lag_us) for c in evidence.stamps.cameras)
     assert evidence.verdict.state is SyncState.SYNCHRONISED
@@ -188,7 +190,7 @@ def test_cameras_on_one_clock_are_compared_without_the_hosts() -> None:
 
 def test_one_camera_is_always_together() -> None:
     station = memory_station(1)
-    verdict = gather(station, shooting(station, [[500.0]])).verdict
+    verdict = gather(station, captured(station, [[500.0]])).verdict
     assert verdict.state is SyncState.SYNCHRONISED and verdict.within_us == 0.0
 
 
@@ -229,7 +231,7 @@ def board(readings: Sequence[Reading | None], range_us: float = 1e6) -> Board:
     return Board(read, range_us)
 
 
-def pictured(shot: Shooting) -> Shooting:
+def pictured(shot: CaptureData) -> CaptureData:
     """The same with pixels to look at."""
     import numpy as np
 
@@ -247,7 +249,7 @@ LIT = memory_station(3, leds=(LightPlan(15, 0.0, 1000.0),))
 def test_the_timing_board_is_the_highest_level() -> None:
     """Exposures of 4 ms with lags of 100, 250 and 400 us: middles at 2100, 2250 and 2400."""
     readings = [Reading(2100.0, 4000.0), Reading(2250.0, 4000.0), Reading(2400.0, 4000.0)]
-    shot = pictured(shooting(LIT, [[0.0]] * 3, capabilities=MUTE))
+    shot = pictured(captured(LIT, [[0.0]] * 3, capabilities=MUTE))
     evidence = gather(LIT, shot, board(readings))
     assert evidence.optical is not None
     assert [r.lag_us for r in evidence.optical.readings] == pytest.approx([100.0, 250.0, 400.0])
@@ -258,7 +260,7 @@ def test_the_timing_board_is_the_highest_level() -> None:
 
 
 def test_a_board_that_one_camera_cannot_see_is_no_proof_for_all() -> None:
-    shot = pictured(shooting(LIT, [[0.0]] * 3))
+    shot = pictured(captured(LIT, [[0.0]] * 3))
     readings = [Reading(2100.0, 4000.0), None, Reading(2400.0, 4000.0)]
     evidence = gather(LIT, shot, board(readings))
     assert evidence.verdict.level is Level.STAMPS
@@ -269,7 +271,7 @@ def test_a_board_that_one_camera_cannot_see_is_no_proof_for_all() -> None:
 
 def test_a_counter_that_has_gone_round_gives_the_lag_that_is_expected() -> None:
     station = with_camera(LIT, "cam01", expected_lag_us=114_000.0)
-    shot = pictured(shooting(station, [[0.0]] * 3))
+    shot = pictured(captured(station, [[0.0]] * 3))
     # A board of 65.536 ms shows 114.3 ms of lag as 48.764 ms.
     reading = Reading((114_300.0 + 2000.0) % 65_536.0, 4000.0)
     evidence = gather(station, shot, board([reading, None, None], 65_536.0))
@@ -280,7 +282,7 @@ def test_a_counter_that_has_gone_round_gives_the_lag_that_is_expected() -> None:
 def test_lags_of_several_captures_and_the_delays_they_ask_for() -> None:
     station = memory_station()
     captures = [
-        gather(station, shooting(station, [[100.0 + j], [400.0 - j], [900.0 + 2 * j]]))
+        gather(station, captured(station, [[100.0 + j], [400.0 - j], [900.0 + 2 * j]]))
         for j in (-10.0, 0.0, 10.0)
     ]
     lags = estimate_lags(captures)
@@ -299,7 +301,7 @@ def test_lags_of_several_captures_and_the_delays_they_ask_for() -> None:
 
 def test_delays_bring_middles_together_not_starts() -> None:
     station = memory_station(2)
-    shot = shooting(station, [[100.0], [100.0]])
+    shot = captured(station, [[100.0], [100.0]])
     long = shot.parts[1].pairing.pairs[0]
     longer = replace(long, frame=replace(long.frame, exposure_us=6000.0))
     pairing = replace(shot.parts[1].pairing, pairs=(longer,))
@@ -309,7 +311,7 @@ def test_delays_bring_middles_together_not_starts() -> None:
 
 
 def test_the_board_is_believed_before_the_stamps() -> None:
-    shot = pictured(shooting(LIT, [[0.0]] * 3))
+    shot = pictured(captured(LIT, [[0.0]] * 3))
     readings = [Reading(2100.0, 4000.0), None, Reading(2400.0, 4000.0)]
     lags = estimate_lags([gather(LIT, shot, board(readings))])
     assert {n: e.source for n, e in lags.items()} == {
@@ -321,7 +323,7 @@ def test_the_board_is_believed_before_the_stamps() -> None:
 
 def test_no_delays_without_every_cameras_lag() -> None:
     station = memory_station()
-    lags = estimate_lags([gather(station, shooting(station, [[1.0], [2.0], [3.0]]))])
+    lags = estimate_lags([gather(station, captured(station, [[1.0], [2.0], [3.0]]))])
     del lags["cam02"]
     with pytest.raises(InputError, match="the lag of cam02 could not be measured"):
         new_timings(station, lags)

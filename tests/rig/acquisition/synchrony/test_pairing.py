@@ -16,11 +16,11 @@ from rig.acquisition.cameras.base import (
     TimestampKind,
     TriggerKind,
 )
-from rig.acquisition.synchrony.clocks import Instant, InstantSource
+from rig.acquisition.synchrony.cameraframes import CameraFrames, Method
+from rig.acquisition.synchrony.clocks import TriggerTime, TriggerTimeSource
 from rig.acquisition.synchrony.counters import steps
 from rig.acquisition.synchrony.faults import FaultKind
 from rig.acquisition.synchrony.pairing import pair
-from rig.acquisition.synchrony.take import Method, Take
 
 MS = 1_000_000
 START = 10**12
@@ -62,24 +62,25 @@ def frame(
     )
 
 
-def instants(count: int, interval_ns: int = INTERVAL_NS) -> tuple[Instant, ...]:
+def trigger_times(count: int, interval_ns: int = INTERVAL_NS) -> tuple[TriggerTime, ...]:
     return tuple(
-        Instant(k + 1, START + k * interval_ns, 5.0, InstantSource.EDGE_LOG) for k in range(count)
+        TriggerTime(k + 1, START + k * interval_ns, 5.0, TriggerTimeSource.EDGE_LOG)
+        for k in range(count)
     )
 
 
-def take(frames: Sequence[Frame], shots: int = 3, **changes: object) -> Take:
+def received(frames: Sequence[Frame], shots: int = 3, **changes: object) -> CameraFrames:
     values: dict[str, object] = {
         "camera": "cam01",
         "capabilities": CAMERA,
         "frames": tuple(frames),
-        "instants": instants(shots),
+        "instants": trigger_times(shots),
         "armed_host_ns": START - 50 * MS,
         "clock": CLOCK,
         "lag_us": LAG_US,
         "lag_tolerance_us": TOLERANCE_US,
     }
-    return Take(**{**values, **changes})  # type: ignore[arg-type]
+    return CameraFrames(**{**values, **changes})  # type: ignore[arg-type]
 
 
 def burst(shots: int = 3, first_counter: int = 65534, off_us: float = 0.0) -> list[Frame]:
@@ -104,7 +105,7 @@ ALL_RIGHT = {1: "1", 2: "2", 3: "3"}
 
 
 def test_a_sound_burst_is_paired_whatever_order_it_arrives_in() -> None:
-    result = pair(take(list(reversed(burst()))))
+    result = pair(received(list(reversed(burst()))))
     assert truths(result) == ALL_RIGHT
     assert not result.faults
     assert {one.method for one in result.pairs} == {Method.TIMESTAMP}
@@ -112,25 +113,25 @@ def test_a_sound_burst_is_paired_whatever_order_it_arrives_in() -> None:
 
 def test_the_first_to_arrive_is_not_the_first_shot() -> None:
     """The classic: the first picture is lost, and order of arrival shifts all the others."""
-    result = pair(take(burst()[1:]))
+    result = pair(received(burst()[1:]))
     assert truths(result) == {2: "2", 3: "3"}
     (fault,) = result.faults
     assert (fault.kind, fault.shot) == (FaultKind.MISSING, 1)
 
 
 def test_a_picture_lost_on_the_way_is_told_from_one_never_made() -> None:
-    lost = pair(take([burst()[0], burst()[2]]))
+    lost = pair(received([burst()[0], burst()[2]]))
     assert kinds(lost) == {FaultKind.MISSING, FaultKind.COUNTER_GAP}
     assert any("lost on the way" in fault.text for fault in lost.faults)
     first, third = burst()[0], burst()[2]
-    never = pair(take([first, replace(third, counter=65535)]))
+    never = pair(received([first, replace(third, counter=65535)]))
     assert kinds(never) == {FaultKind.MISSING}
     assert truths(never) == truths(lost) == {1: "1", 3: "3"}
 
 
 def test_a_stale_picture_at_the_start_is_left_out() -> None:
     stale = frame(START - 80 * MS, 65533)
-    result = pair(take([stale, *burst()]))
+    result = pair(received([stale, *burst()]))
     assert truths(result) == ALL_RIGHT
     assert kinds(result) == {FaultKind.EXTRA_AT_START}
 
@@ -138,31 +139,31 @@ def test_a_stale_picture_at_the_start_is_left_out() -> None:
 def test_many_stale_pictures_are_no_free_run() -> None:
     """Late pictures of the last burst were exposed before this one was armed."""
     stale = [frame(START - (200 - k) * MS, 65500 + k) for k in range(4)]
-    result = pair(take([*stale, *burst()]))
+    result = pair(received([*stale, *burst()]))
     assert truths(result) == ALL_RIGHT
     assert FaultKind.FREE_RUNNING not in kinds(result)
 
 
 def test_a_picture_delivered_twice_is_kept_once() -> None:
     one, two, three = burst()
-    result = pair(take([one, two, two, three]))
+    result = pair(received([one, two, two, three]))
     assert truths(result) == ALL_RIGHT
     assert kinds(result) == {FaultKind.DUPLICATE}
     broken = replace(two, status=FrameStatus.INCOMPLETE)
-    assert pair(take([one, broken, two, three])).pair(2).frame.status is FrameStatus.OK  # type: ignore[union-attr]
+    assert pair(received([one, broken, two, three])).pair(2).frame.status is FrameStatus.OK  # type: ignore[union-attr]
 
 
 def test_two_exposures_about_one_shot_cannot_be_told_apart() -> None:
     one, two, three = burst()
     other = frame(START + INTERVAL_NS + round(LAG_US * 1000) + MS, 1)
-    result = pair(take([one, two, other, replace(three, counter=2)]))
+    result = pair(received([one, two, other, replace(three, counter=2)]))
     assert truths(result) == {1: "1", 3: "3"}
     assert kinds(result) == {FaultKind.AMBIGUOUS}
 
 
 def test_a_free_running_camera_gives_nothing() -> None:
     frames = [frame(START + k * 7 * MS, 65500 + k) for k in range(-5, 8)]
-    result = pair(take(frames))
+    result = pair(received(frames))
     assert not result.pairs
     assert FaultKind.FREE_RUNNING in kinds(result)
     assert any("not triggered from outside" in fault.text for fault in result.faults)
@@ -170,7 +171,7 @@ def test_a_free_running_camera_gives_nothing() -> None:
 
 def test_one_picture_too_many_is_named() -> None:
     stray = frame(START + 2 * INTERVAL_NS + 9 * MS, 2)
-    result = pair(take([*burst(), stray]))
+    result = pair(received([*burst(), stray]))
     assert truths(result) == ALL_RIGHT
     assert kinds(result) == {FaultKind.EXTRA}
 
@@ -178,7 +179,7 @@ def test_one_picture_too_many_is_named() -> None:
 def test_late_and_incomplete_pictures_are_paired_and_named() -> None:
     one, two, three = burst()
     result = pair(
-        take(
+        received(
             [
                 replace(one, status=FrameStatus.LATE),
                 replace(two, status=FrameStatus.INCOMPLETE),
@@ -195,14 +196,14 @@ def test_late_and_incomplete_pictures_are_paired_and_named() -> None:
 def test_a_lag_nobody_expected_is_named_with_its_length() -> None:
     """A body with 114 ms of lag in a station that expects 0.3 ms, bursts 20 ms apart."""
     for shots in (1, 3):
-        result = pair(take(burst(shots, off_us=113_700.0), shots))
+        result = pair(received(burst(shots, off_us=113_700.0), shots))
         assert not result.pairs
         assert FaultKind.LAG_OFF in kinds(result)
         assert any("114.0 ms" in fault.text for fault in result.faults)
 
 
 def test_shots_faster_than_the_lag_is_known_are_not_guessed() -> None:
-    result = pair(take(burst(), lag_tolerance_us=20_000.0))
+    result = pair(received(burst(), lag_tolerance_us=20_000.0))
     assert not result.pairs
     assert kinds(result) == {FaultKind.AMBIGUOUS}
 
@@ -210,7 +211,7 @@ def test_shots_faster_than_the_lag_is_known_are_not_guessed() -> None:
 def test_a_counter_that_contradicts_the_stamps_gives_nothing() -> None:
     one, two, three = burst()
     crossed = [one, replace(two, counter=three.counter), replace(three, counter=two.counter)]
-    result = pair(take(crossed))
+    result = pair(received(crossed))
     assert not result.pairs
     assert FaultKind.COUNTER_CONFLICT in kinds(result)
 
@@ -221,17 +222,17 @@ def test_stamps_of_a_clock_that_was_reset_are_not_believed(jumped: bool) -> None
     if not jumped:
         # Stamped after it arrived: the clock has been set forward.
         frames = [replace(f, device_ns=(f.device_ns or 0) + 10**10) for f in frames]
-    result = pair(take(frames, clock_jumped=jumped))
+    result = pair(received(frames, clock_jumped=jumped))
     assert FaultKind.TIMESTAMP_RESET in kinds(result)
     assert {one.method for one in result.pairs} == {Method.ARRIVAL}
 
 
 def test_without_stamps_the_order_counts_and_says_so() -> None:
     frames = [replace(f, device_ns=None, counter=None) for f in burst()]
-    result = pair(take(frames, capabilities=MUTE, clock=None))
+    result = pair(received(frames, capabilities=MUTE, clock=None))
     assert truths(result) == ALL_RIGHT
     assert kinds(result) == {FaultKind.BY_ARRIVAL}
-    lost = pair(take(frames[1:], capabilities=MUTE, clock=None))
+    lost = pair(received(frames[1:], capabilities=MUTE, clock=None))
     assert not lost.pairs
     assert "cannot be told" in lost.faults[0].text
     assert kinds(lost) == {FaultKind.MISSING}
@@ -243,7 +244,7 @@ def test_without_stamps_a_counter_gap_stops_the_guess() -> None:
     frames = [
         replace(f, device_ns=None, counter=c) for f, c in zip(burst(), (5, 6, 8), strict=True)
     ]
-    result = pair(take(frames, capabilities=mute, clock=None))
+    result = pair(received(frames, capabilities=mute, clock=None))
     assert not result.pairs
     assert kinds(result) == {FaultKind.AMBIGUOUS}
 
@@ -252,7 +253,7 @@ def test_a_camera_that_runs_freely_without_stamps_is_named() -> None:
     frames = [
         replace(frame(START + k * 7 * MS), device_ns=None, counter=None) for k in range(-4, 6)
     ]
-    result = pair(take(frames, capabilities=MUTE, clock=None))
+    result = pair(received(frames, capabilities=MUTE, clock=None))
     assert not result.pairs
     assert FaultKind.FREE_RUNNING in kinds(result)
 
@@ -276,7 +277,7 @@ FATES = st.sampled_from(["sound", "sound", "sound", "drop", "miss", "twice", "la
 
 
 @st.composite
-def stories(draw: st.DrawFn) -> tuple[Take, dict[str, bool]]:
+def stories(draw: st.DrawFn) -> tuple[CameraFrames, dict[str, bool]]:
     """One camera's capture with any mix of faults, and what is true about it."""
     shots = draw(st.integers(1, 6))
     bias = draw(st.floats(0.0, 1600.0))
@@ -298,22 +299,26 @@ def stories(draw: st.DrawFn) -> tuple[Take, dict[str, bool]]:
             frames += [frame(at, counter, shot, arrives)] * (2 if fate == "twice" else 1)
     capabilities = replace(CAMERA, frame_counter_modulus=modulus)
     clean = all(fate == "sound" for _, _, fate in events) and len(events) == shots
-    result = take(draw(st.permutations(frames)), shots, capabilities=capabilities, deadline_s=1.0)
+    result = received(
+        draw(st.permutations(frames)), shots, capabilities=capabilities, deadline_s=1.0
+    )
     return result, {"clean": clean}
 
 
-def in_a_window(story: Take, exposed: Frame) -> bool:
+def in_a_window(story: CameraFrames, exposed: Frame) -> bool:
     at = CLOCK.host_ns(exposed.device_ns or 0)
     return any(
         (at - i.at_host_ns) / 1000.0 <= LAG_US + TOLERANCE_US + 25.0
         and (at - i.at_host_ns) / 1000.0 >= -25.0
-        for i in story.instants
+        for i in story.trigger_times
     )
 
 
 @settings(max_examples=600, deadline=None)
 @given(stories())
-def test_no_picture_is_ever_given_to_the_wrong_shot(story: tuple[Take, dict[str, bool]]) -> None:
+def test_no_picture_is_ever_given_to_the_wrong_shot(
+    story: tuple[CameraFrames, dict[str, bool]],
+) -> None:
     told, facts = story
     result = pair(told)
     for one in result.pairs:
@@ -323,9 +328,9 @@ def test_no_picture_is_ever_given_to_the_wrong_shot(story: tuple[Take, dict[str,
         assert truth == one.shot or (truth == 0 and in_a_window(told, one.frame))
     paired = {one.shot for one in result.pairs}
     if facts["clean"]:
-        assert paired == {i.shot for i in told.instants}
+        assert paired == {i.shot for i in told.trigger_times}
         assert not result.faults
-    if paired != {i.shot for i in told.instants}:
+    if paired != {i.shot for i in told.trigger_times}:
         assert result.faults
         assert any(not fault.harmless for fault in result.faults)
 
@@ -349,7 +354,7 @@ def test_order_of_arrival_gives_no_wrong_pair_when_pictures_are_lost_or_too_many
     early = [replace(frame(START + round(ms * MS), 90, 0, 0.5), device_ns=None) for ms in early_ms]
     frames = [f if counted else replace(f, counter=None) for f in frames]
     result = pair(
-        take(
+        received(
             [*early, *frames], shots, capabilities=replace(MUTE, frame_counter=counted), clock=None
         )
     )

@@ -7,13 +7,48 @@ import typing
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from common.errors import InputError
 from common.files.strict import section_of
+from geometry.camera import RigCamera
+from rig.acquisition.cameras.base import CameraBackend
+from rig.acquisition.capture.rigfacts import read_rig_design
 from rig.acquisition.station.spec import Station
+from rig.acquisition.trigger.box import TriggerBox
+from rig.simulation.settings import SimulationSettings
 
-if TYPE_CHECKING:
-    from rig.simulation.settings import SimulationSettings
+
+def simulated_backend(
+    station: Station, box: TriggerBox | None, options: Mapping[str, Any]
+) -> CameraBackend:
+    """The station's cameras, simulated. ``options``: it has none; InputError for any."""
+    # Imported here: rendering is heavy, and stations of real cameras need nothing of it.
+    from rig.simulation.backend import SimulatedBackend
+
+    if options:
+        raise InputError(
+            "camera-option",
+            f"option '{next(iter(options))}' of the simulated cameras is not known",
+            "what they see and do stands in [simulation]",
+        )
+    cameras = list(simulated_cameras(station).values())
+    return SimulatedBackend(cameras, simulation_settings(station), box)
+
+
+def simulated_cameras(station: Station) -> Mapping[str, RigCamera]:
+    """What the simulated backend has to know of its cameras: where they stand and what they are.
+
+    Raises :class:`InputError` for a station without a design.
+    """
+    design = read_rig_design(station)
+    if not design.cameras:
+        raise InputError(
+            "station-no-design",
+            "simulated cameras need a design, which says where they stand",
+            'make one with `rigwright design` and name it: design = "design.json"',
+        )
+    return design.cameras
 
 
 def simulation_settings(station: Station) -> SimulationSettings:
@@ -22,9 +57,6 @@ def simulation_settings(station: Station) -> SimulationSettings:
     Files are looked for beside the station file; the timing board and its line are those of
     ``[led]`` where the section does not say. Raises a one-line :class:`InputError`.
     """
-    # Imported here: stations of real cameras need nothing of the simulation.
-    from rig.simulation.settings import SimulationSettings
-
     data = _with_wiring(dict(station.simulation or {}), station)
     settings = section_of(SimulationSettings, data, "simulation")
     folder = Path() if station.path is None else station.path.parent

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from io import BytesIO
-from typing import cast
 
 import numpy as np
 
 from rig.acquisition.cameras.base import Frame, Image
+from rig.acquisition.imaging import glanced
+from rig.acquisition.synchrony.cameraframes import Pairing
 from rig.acquisition.synchrony.faults import Fault, FaultKind
-from rig.acquisition.synchrony.take import Pairing
 
 BLACK_SHARE = {8: 1.0 / 16.0, 16: 1.0 / 50.0}
 """A picture whose 99.9th percentile stays below this share of full scale shows nothing, by bits.
@@ -27,7 +27,7 @@ READABLE_TYPES = ("image/jpeg", "image/png", "image/tiff")
 
 
 @dataclass(frozen=True)
-class Look:
+class ImageCheck:
     """What a glance showed. ``size_px`` (width, height) None where it could not be read."""
 
     size_px: tuple[int, int] | None
@@ -40,36 +40,34 @@ def is_raw(frame: Frame) -> bool:
     return frame.encoded is not None and frame.media_type not in READABLE_TYPES
 
 
-def look_at(frame: Frame) -> Look:
+def check_image(frame: Frame) -> ImageCheck:
     """Glance at one picture."""
     if frame.pixels is not None:
         height, width = frame.pixels.shape[:2]
-        return Look((width, height), _black(frame.pixels))
+        return ImageCheck((width, height), _black(frame.pixels))
     if frame.encoded is None:
-        return Look(None, readable=False)
+        return ImageCheck(None, readable=False)
     if is_raw(frame):
-        return Look(None)
-    return _look_at_file(frame.encoded)
+        return ImageCheck(None)
+    return _check_file(frame.encoded)
 
 
-def _look_at_file(data: bytes) -> Look:
-    import cv2
+def _check_file(data: bytes) -> ImageCheck:
     from PIL import Image as Pictures
 
-    # An eighth each way is enough to see whether there is anything, and decodes in no time.
-    flags = cv2.IMREAD_REDUCED_GRAYSCALE_8 | cv2.IMREAD_IGNORE_ORIENTATION
     try:
         size = Pictures.open(BytesIO(data)).size
-        pixels = cv2.imdecode(np.frombuffer(data, np.uint8), flags)
-    except (OSError, SyntaxError, ValueError, cv2.error):
-        # Each damaged file makes the libraries throw something else, or return nothing.
-        return Look(None, readable=False)
+    except (OSError, SyntaxError, ValueError):
+        # Each damaged file makes the library throw something else.
+        return ImageCheck(None, readable=False)
+    # An eighth each way is enough to see whether there is anything, and decodes in no time.
+    pixels = glanced(data)
     if pixels is None:
-        return Look(None, readable=False)
+        return ImageCheck(None, readable=False)
     if data[:2] == b"\xff\xd8" and b"\xff\xd9" not in data[-4096:]:
         # The decoder fills what is missing of a JPEG that was cut off with grey.
-        return Look(size, readable=False)
-    return Look(size, _black(cast(Image, pixels)))
+        return ImageCheck(size, readable=False)
+    return ImageCheck(size, _black(pixels))
 
 
 def _black(pixels: Image) -> bool:
@@ -78,11 +76,11 @@ def _black(pixels: Image) -> bool:
     return bool(np.percentile(thin, 99.9) < BLACK_SHARE[depth.bits] * float(depth.max))
 
 
-def look_faults(pairing: Pairing, size_px: tuple[int, int] | None) -> list[Fault]:
+def image_faults(pairing: Pairing, size_px: tuple[int, int] | None) -> list[Fault]:
     """What is wrong with the pictures of one camera that were given to shots."""
     faults = []
     for one in pairing.pairs:
-        look = look_at(one.frame)
+        look = check_image(one.frame)
         name, shot = pairing.camera, one.shot
         which = f"{name}: the picture of shot {shot}"
         if not look.readable:

@@ -7,34 +7,34 @@ from dataclasses import replace
 
 from common.errors import DeviceError
 from rig.acquisition.cameras.base import CameraCapabilities, ClockSample, TriggerKind
+from rig.acquisition.capture.camerathreads import CameraThread
 from rig.acquisition.capture.collect import Collected
 from rig.acquisition.capture.firing import Firing
-from rig.acquisition.capture.hands import CameraHand
 from rig.acquisition.station.spec import CameraPlan, Station
-from rig.acquisition.synchrony.clocks import ClockFitter, DeviceClock, Instant, clock_jumped
+from rig.acquisition.synchrony.cameraframes import CameraFrames, Pairing
+from rig.acquisition.synchrony.capturedata import CameraPart, CaptureData
+from rig.acquisition.synchrony.clocks import ClockFitter, DeviceClock, TriggerTime, clock_jumped
 from rig.acquisition.synchrony.faults import Fault, FaultKind
-from rig.acquisition.synchrony.instants import command_instants, edge_instants
-from rig.acquisition.synchrony.looks import is_raw, look_faults
+from rig.acquisition.synchrony.imagechecks import image_faults, is_raw
 from rig.acquisition.synchrony.pairing import pair
-from rig.acquisition.synchrony.shooting import CameraPart, Shooting
 from rig.acquisition.synchrony.swaps import swapped
-from rig.acquisition.synchrony.take import Pairing, Take
+from rig.acquisition.synchrony.triggertimes import command_times, edge_times
 from rig.acquisition.trigger.box import FireOutcome
 
 Sizes = Mapping[str, tuple[int, int]]
 
 
-def develop(station: Station, firing: Firing, fit: ClockFitter, sizes: Sizes) -> Shooting:
+def pair_and_judge(station: Station, firing: Firing, fit: ClockFitter, sizes: Sizes) -> CaptureData:
     """Pair and judge everything one firing gave. ``sizes``: what pictures must measure, by camera.
 
     Raises :class:`DeviceError` ``trigger-unknown`` when nobody can tell whether the box fired,
     and no picture shows that it did.
     """
     shots = _shots_done(firing)
-    parts = tuple(_part(station, firing, hand, fit, sizes, shots) for hand in firing.hands)
+    parts = tuple(_part(station, firing, thread, fit, sizes, shots) for thread in firing.threads)
     _require_fired(firing, parts)
     faults = [*firing.faults, *_stopped(firing, shots), *swapped(station, parts)]
-    return Shooting(
+    return CaptureData(
         capture_id=firing.order.capture_id,
         shots=firing.order.shots,
         interval_us=firing.order.interval_us,
@@ -80,24 +80,24 @@ def _stopped(firing: Firing, shots: int) -> list[Fault]:
 def _part(
     station: Station,
     firing: Firing,
-    hand: CameraHand,
+    thread: CameraThread,
     fit: ClockFitter,
     sizes: Sizes,
     shots: int,
 ) -> CameraPart:
-    name = hand.plan.name
+    name = thread.plan.name
     got, ready = firing.collected[name], firing.ready[name]
-    capabilities = hand.device.capabilities
+    capabilities = thread.device.capabilities
     samples = (*ready.clock_samples, *got.clock_samples)
     clock, jumped = _clock(samples, fit)
-    plan = _with_known_lag(hand.plan, capabilities)
+    plan = _with_known_lag(thread.plan, capabilities)
     pictures = tuple(frame for frame in got.frames if not is_raw(frame))
     raws = tuple(frame for frame in got.frames if is_raw(frame))
-    take = Take(
+    received = CameraFrames(
         camera=name,
         capabilities=capabilities,
         frames=pictures or raws,
-        instants=_instants(station, firing, hand.plan, capabilities, got, shots),
+        trigger_times=_trigger_times(station, firing, thread.plan, capabilities, got, shots),
         armed_host_ns=ready.armed_host_ns,
         clock=clock,
         clock_jumped=jumped,
@@ -105,14 +105,16 @@ def _part(
         lag_tolerance_us=plan.lag_tolerance_us,
         deadline_s=station.policy.frame_deadline_s,
     )
-    paired = _explained(_judged(_pair_if_shot(take), sizes.get(name)), got.problem)
-    beside = _pair_if_shot(replace(take, frames=raws)) if pictures and raws else None
-    return CameraPart(hand.plan, hand.device.info, ready.settings, take, paired, beside, samples)
+    paired = _explained(_judged(_pair_if_shot(received), sizes.get(name)), got.problem)
+    beside = _pair_if_shot(replace(received, frames=raws)) if pictures and raws else None
+    return CameraPart(
+        thread.plan, thread.device.info, ready.settings, received, paired, beside, samples
+    )
 
 
-def _pair_if_shot(take: Take) -> Pairing:
+def _pair_if_shot(received: CameraFrames) -> Pairing:
     """The pairing, with deadlines; a burst that was stopped before its first shot has none."""
-    return pair(take) if take.instants else Pairing(take.camera, (), ())
+    return pair(received) if received.trigger_times else Pairing(received.camera, (), ())
 
 
 def _with_known_lag(plan: CameraPlan, capabilities: CameraCapabilities) -> CameraPlan:
@@ -129,23 +131,21 @@ def _clock(samples: tuple[ClockSample, ...], fit: ClockFitter) -> tuple[DeviceCl
     return fit(samples) if samples else None, False
 
 
-def _instants(
+def _trigger_times(
     station: Station,
     firing: Firing,
     plan: CameraPlan,
     capabilities: CameraCapabilities,
     got: Collected,
     shots: int,
-) -> tuple[Instant, ...]:
+) -> tuple[TriggerTime, ...]:
     if capabilities.trigger is TriggerKind.SOFTWARE:
-        return command_instants(got.sent)
-    return edge_instants(
-        station, plan, firing.report, firing.fired, shots, firing.order.interval_us
-    )
+        return command_times(got.sent)
+    return edge_times(station, plan, firing.report, firing.fired, shots, firing.order.interval_us)
 
 
 def _judged(pairing: Pairing, size_px: tuple[int, int] | None) -> Pairing:
-    return replace(pairing, faults=(*pairing.faults, *look_faults(pairing, size_px)))
+    return replace(pairing, faults=(*pairing.faults, *image_faults(pairing, size_px)))
 
 
 def _explained(pairing: Pairing, problem: str) -> Pairing:

@@ -2,30 +2,62 @@
 
 from __future__ import annotations
 
-import importlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
-from typing import cast
 
 from common.errors import InputError, RigwrightError
 from rig.acquisition.cameras.base import CameraBackend, CameraInfo
 
-BACKENDS: Mapping[str, str] = {
-    "simulated": "rig.simulation.backend:SimulatedBackend",
-    "folder": "rig.acquisition.cameras.folder:FolderBackend",
-    "opencv": "rig.acquisition.cameras.opencv:OpencvBackend",
-    "genicam": "rig.acquisition.cameras.genicam:GenicamBackend",
-    "aravis": "rig.acquisition.cameras.aravis:AravisBackend",
-    "gphoto2": "rig.acquisition.cameras.gphoto2:GphotoBackend",
+Options = Mapping[str, object]
+SIMULATED = "simulated"
+"""Cameras of a whole station that are computed: no backend by itself, its options are none."""
+
+
+def _folder(options: Options) -> CameraBackend:
+    from rig.acquisition.cameras.folder import FolderBackend
+
+    return FolderBackend(**options)
+
+
+def _opencv(options: Options) -> CameraBackend:
+    from rig.acquisition.cameras.opencv import OpencvBackend
+
+    return OpencvBackend(**options)
+
+
+def _genicam(options: Options) -> CameraBackend:
+    from rig.acquisition.cameras.genicam import GenicamBackend
+
+    return GenicamBackend(**options)
+
+
+def _aravis(options: Options) -> CameraBackend:
+    from rig.acquisition.cameras.aravis import AravisBackend
+
+    return AravisBackend(**options)
+
+
+def _gphoto2(options: Options) -> CameraBackend:
+    from rig.acquisition.cameras.gphoto2 import GphotoBackend
+
+    return GphotoBackend(**options)
+
+
+BACKENDS: Mapping[str, Callable[[Options], CameraBackend]] = {
+    "folder": _folder,
+    "opencv": _opencv,
+    "genicam": _genicam,
+    "aravis": _aravis,
+    "gphoto2": _gphoto2,
 }
-"""Name in station files, then module and class. Adding a backend is adding a line."""
+"""Drivers by their name in station files. Adding one is adding a line."""
 
 ON_THEIR_OWN = ("opencv", "genicam", "aravis", "gphoto2")
 """Backends that find cameras without being told where."""
 
 
-def make_backend(name: str, options: Mapping[str, object] | None = None) -> CameraBackend:
+def make_backend(name: str, options: Options | None = None) -> CameraBackend:
     """A backend with its options as they stand in a station file.
 
     InputError for an unknown name or option; DeviceError ``device/backend-missing``, with the
@@ -35,11 +67,9 @@ def make_backend(name: str, options: Mapping[str, object] | None = None) -> Came
         raise InputError(
             "camera-backend",
             f"there is no camera backend '{name}'",
-            f"choose one of {', '.join(BACKENDS)}",
+            f"choose one of {', '.join((SIMULATED, *BACKENDS))}",
         )
-    module, _, factory = BACKENDS[name].partition(":")
-    made = getattr(importlib.import_module(module), factory)(**(options or {}))
-    return cast("CameraBackend", made)
+    return BACKENDS[name](options or {})
 
 
 @dataclass(frozen=True)
@@ -51,12 +81,12 @@ class Discovery:
 
 
 def discover_all(
-    options: Mapping[str, Mapping[str, object]] | None = None,
+    options: Mapping[str, Options] | None = None,
 ) -> Discovery:
     """Look for cameras in every way at once, each backend by itself.
 
-    ``options`` are those of single backends; ``folder`` and ``simulated`` look only when they
-    have some. A backend whose library is missing is a line in ``problems``, never an error.
+    ``options`` are those of single backends; ``folder`` looks only when it has some. A backend
+    whose library is missing is a line in ``problems``, never an error.
     """
     given = options or {}
     names = [name for name in BACKENDS if name in given or name in ON_THEIR_OWN]
@@ -67,7 +97,7 @@ def discover_all(
     return Discovery(tuple(cameras), problems)
 
 
-def _look(name: str, options: Mapping[str, object]) -> tuple[tuple[CameraInfo, ...], str]:
+def _look(name: str, options: Options) -> tuple[tuple[CameraInfo, ...], str]:
     try:
         backend = make_backend(name, options)
     except RigwrightError as error:

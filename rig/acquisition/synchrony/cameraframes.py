@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from rig.acquisition.cameras.base import CameraCapabilities, Frame
-from rig.acquisition.synchrony.clocks import DeviceClock, Instant
+from rig.acquisition.synchrony.clocks import DeviceClock, TriggerTime
 from rig.acquisition.synchrony.faults import Fault
 
 
@@ -20,19 +20,19 @@ class Method(StrEnum):
 
 
 @dataclass(frozen=True, eq=False)
-class Take:
+class CameraFrames:
     """One camera's part of a capture.
 
-    ``instants``: when it was told to expose, in shot order, at least one. ``armed_host_ns``: when
-    it was ready. ``clock`` is None where its time stamps cannot be related to the host's clock;
-    ``clock_jumped`` where they could until its clock jumped. Lags are from instant to exposure;
-    ``deadline_s`` from instant to arrival.
+    ``trigger_times``: when it was told to expose, in shot order, at least one. ``armed_host_ns``:
+    when it was ready. ``clock`` is None where its time stamps cannot be related to the host's
+    clock; ``clock_jumped`` where they could until its clock jumped. Lags are from trigger to
+    exposure; ``deadline_s`` from trigger to arrival.
     """
 
     camera: str
     capabilities: CameraCapabilities
     frames: tuple[Frame, ...]
-    instants: tuple[Instant, ...]
+    trigger_times: tuple[TriggerTime, ...]
     armed_host_ns: int
     clock: DeviceClock | None = None
     clock_jumped: bool = False

@@ -18,7 +18,7 @@ from rig.acquisition.station.spec import CameraPlan
 T = TypeVar("T")
 
 
-class CameraHand:
+class CameraThread:
     """An open camera and its thread.
 
     Jobs are done in order. A job that hangs (a library that waits for a dead device) cannot be
@@ -96,7 +96,7 @@ def outcomes(
 
 
 def do_all(
-    hands: Iterable[CameraHand], job: Callable[[CameraDevice], T], timeout_s: float
+    threads: Iterable[CameraThread], job: Callable[[CameraDevice], T], timeout_s: float
 ) -> tuple[dict[str, T], dict[str, str]]:
     """The same job on all cameras at once."""
-    return outcomes({hand.plan.name: hand.do(job) for hand in hands}, timeout_s)
+    return outcomes({thread.plan.name: thread.do(job) for thread in threads}, timeout_s)

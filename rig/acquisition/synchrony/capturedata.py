@@ -8,8 +8,8 @@ from datetime import datetime
 
 from rig.acquisition.cameras.base import CameraInfo, CameraSettings, ClockSample
 from rig.acquisition.station.spec import CameraPlan
+from rig.acquisition.synchrony.cameraframes import CameraFrames, Pairing
 from rig.acquisition.synchrony.faults import Fault
-from rig.acquisition.synchrony.take import Pairing, Take
 from rig.acquisition.trigger.box import ArmRequest, FireReport
 
 
@@ -21,7 +21,7 @@ class CameraPart:
     info: CameraInfo
     settings: CameraSettings
     """What it really had, as far as it can tell."""
-    take: Take
+    received: CameraFrames
     pairing: Pairing
     raws: Pairing | None = None
     """Raw files that came beside the pictures, paired by themselves."""
@@ -29,7 +29,7 @@ class CameraPart:
 
 
 @dataclass(frozen=True, eq=False)
-class Shooting:
+class CaptureData:
     """One firing. ``fired_at`` is wall-clock time of the first shot, with its offset.
 
     ``report`` is None for a station without a box. ``shots_done`` is how many shots there were.

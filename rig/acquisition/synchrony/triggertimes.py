@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rig.acquisition.station.spec import CameraPlan, Station
-from rig.acquisition.synchrony.clocks import NS_PER_US, Instant, InstantSource
+from rig.acquisition.synchrony.clocks import NS_PER_US, TriggerTime, TriggerTimeSource
 from rig.acquisition.trigger.box import FireReport
 
 PROGRAMMED_SLACK_US = 20_000.0
@@ -16,7 +16,7 @@ time on the wire."""
 
 
 @dataclass(frozen=True)
-class Bracket:
+class HostInterval:
     """Something happened between these two instants of the host's clock."""
 
     before_ns: int
@@ -33,14 +33,14 @@ class Bracket:
         return (self.after_ns - self.before_ns) / 2.0 / NS_PER_US
 
 
-def edge_instants(
+def edge_times(
     station: Station,
     plan: CameraPlan,
     report: FireReport | None,
-    fired: Bracket,
+    fired: HostInterval,
     shots: int,
     interval_us: float,
-) -> tuple[Instant, ...]:
+) -> tuple[TriggerTime, ...]:
     """When the box told ``plan`` to expose: from its log, else from what it was told to do.
 
     ``shots`` is how many there were, as far as is known.
@@ -48,28 +48,24 @@ def edge_instants(
     edges = () if report is None or plan.output is None else report.rising_edges(plan.output)
     if edges and report is not None and math.isfinite(report.clock_uncertainty_us):
         return tuple(
-            Instant(edge.shot, edge.at_host_ns, report.clock_uncertainty_us, InstantSource.EDGE_LOG)
+            TriggerTime(
+                edge.shot, edge.at_host_ns, report.clock_uncertainty_us, TriggerTimeSource.EDGE_LOG
+            )
             for edge in sorted(edges, key=lambda edge: edge.shot)
         )
     lead = station.trigger.lead_us if station.trigger is not None else 0.0
     first = fired.middle_ns + (lead + station.shutter_delay_us(plan)) * NS_PER_US
-    source = InstantSource.PROGRAMMED if plan.output is not None else InstantSource.NONE
+    source = TriggerTimeSource.PROGRAMMED if plan.output is not None else TriggerTimeSource.NONE
     slack = fired.half_width_us + PROGRAMMED_SLACK_US
     return tuple(
-        Instant(k + 1, round(first + k * interval_us * NS_PER_US), slack, source)
+        TriggerTime(k + 1, round(first + k * interval_us * NS_PER_US), slack, source)
         for k in range(shots)
     )
 
 
-def command_instants(sent: Sequence[Bracket]) -> tuple[Instant, ...]:
+def command_times(sent: Sequence[HostInterval]) -> tuple[TriggerTime, ...]:
     """When a camera was told over its bus."""
     return tuple(
-        Instant(k, b.middle_ns, b.half_width_us, InstantSource.COMMAND)
+        TriggerTime(k, b.middle_ns, b.half_width_us, TriggerTimeSource.COMMAND)
         for k, b in enumerate(sent, start=1)
     )
-
-
-def spread_us(instants: Mapping[str, Instant]) -> float:
-    """How far apart the instants of several cameras are, without their uncertainties."""
-    times = [instant.at_host_ns for instant in instants.values()]
-    return (max(times) - min(times)) / NS_PER_US if times else math.nan

@@ -1,0 +1,53 @@
+"""Picture files to pixels and back: the one place in acquisition that codes pictures by OpenCV.
+
+OpenCV is imported when it is used: many commands start without it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.acquisition.cameras.base import Image
+
+GLANCE_REDUCTION = 8
+"""A picture read at a glance is so many times smaller each way."""
+
+
+def decoded(data: bytes) -> NDArray[np.uint8] | None:
+    """A picture file as (H, W, 3) RGB of 8 bits, as the sensor lay; None: unreadable."""
+    import cv2
+
+    pixels = _read(data, cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
+    return None if pixels is None else np.ascontiguousarray(pixels[:, :, ::-1]).astype(np.uint8)
+
+
+def glanced(data: bytes) -> Image | None:
+    """The grey values of a picture file, an eighth of its size each way; None: unreadable."""
+    import cv2
+
+    return _read(data, cv2.IMREAD_REDUCED_GRAYSCALE_8 | cv2.IMREAD_IGNORE_ORIENTATION)
+
+
+def _read(data: bytes, flags: int) -> Image | None:
+    import cv2
+
+    try:
+        pixels = cv2.imdecode(np.frombuffer(data, np.uint8), flags)
+    except cv2.error:
+        # Each damaged file makes the library throw something else, or return nothing.
+        return None
+    return pixels  # type: ignore[return-value]  # its types say what other flags could give
+
+
+def png(pixels: Image) -> bytes | None:
+    """A PNG of (H, W) or (H, W, 3) RGB pixels, 8 or 16 bits; None where they cannot be coded.
+
+    By OpenCV, which knows 16-bit colour.
+    """
+    import cv2
+
+    ordered = pixels[:, :, ::-1] if pixels.ndim == 3 else pixels
+    # Level 1: three times as fast as the default and a few per cent larger.
+    done, data = cv2.imencode(".png", ordered, [cv2.IMWRITE_PNG_COMPRESSION, 1])
+    return data.tobytes() if done else None
