@@ -23,11 +23,11 @@ from synthetic_scenes import Scene, bars, face_rig, stand, turned
 
 from benchmarks.draws import Draws, drawn
 from benchmarks.pages import table, write_between
+from calibration.adjustment.initialisation.finding import find_start
+from calibration.adjustment.initialisation.resection import RigidTransform
 from calibration.adjustment.levenberg import LossOptions
 from calibration.adjustment.options import FIXED, CalibrationOptions, InteriorModel
 from calibration.adjustment.stages import adjust_in_stages
-from calibration.adjustment.start.finding import find_start
-from calibration.adjustment.start.resection import Placed
 from calibration.observations import TargetSet
 from geometry.arrays import Floats
 
@@ -52,7 +52,7 @@ def speed() -> Speed:
     """9 cameras x 300 targets of unknown place: f, cx, cy, k1, k2 and poses free."""
     carrier, points = stand(300, 11)
     rig = face_rig(9)
-    places = ((Placed(np.eye(3), np.zeros(3)),),)
+    places = ((RigidTransform(np.eye(3), np.zeros(3)),),)
     inside = 0.75 * points
     targets = TargetSet("300", (carrier,), bars(carrier, inside))
     scene = Scene(rig, targets, inside, places)

@@ -32,8 +32,8 @@ from calibration.targets.kinds import (
     CarrierKind,
     CharucoPlate,
     MarkerCarrier,
-    Place,
     RingCarrier,
+    TargetPlace,
     TargetPlan,
 )
 from calibration.targets.rendering import photographed, render
@@ -68,11 +68,11 @@ def camera(size: tuple[int, int], focal_px: float, k1: float) -> Camera:
     return Camera("c", size, 0.005, focal_px * 0.005, 8.0, 0.01, 100.0, body, distortion=terms)
 
 
-def grid(first: int, step_mm: float) -> tuple[Place, ...]:
+def grid(first: int, step_mm: float) -> tuple[TargetPlace, ...]:
     """Sixteen targets in rows of four."""
     sigma = (0.0, 0.0, 0.0)
     return tuple(
-        Place(first + k, (k % 4 * step_mm, k // 4 * step_mm, 0.0), sigma) for k in range(16)
+        TargetPlace(first + k, (k % 4 * step_mm, k // 4 * step_mm, 0.0), sigma) for k in range(16)
     )
 
 

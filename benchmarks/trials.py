@@ -9,12 +9,12 @@ import numpy as np
 from synthetic_scenes import Scene, face_scene, plate_places, turned
 
 from calibration.adjustment import Calibration, CalibrationOptions, calibrate
+from calibration.adjustment.initialisation.resection import RigidTransform
 from calibration.adjustment.rotations import rotation_of
-from calibration.adjustment.start.resection import Placed
 from calibration.check.checking import CheckOptions, judge
 from calibration.check.diagnosis import Prepared, diagnose
 from calibration.check.epoch import Epoch, epoch_of
-from calibration.check.gross import put_right
+from calibration.check.gross import corrected_epoch
 from calibration.check.verdicts import CheckResult, Kind, Light
 from geometry.arrays import Floats, Ints
 from geometry.frames import Pose
@@ -59,7 +59,7 @@ class Bench:
             )
         observations = truth.observe(sigma_px, 2)
         epoch = epoch_of(calibration, observations)
-        righted = put_right(epoch)
+        righted = corrected_epoch(epoch)
         first = diagnose(righted.epoch, righted.start.state).first
         prepared = Prepared.of(righted.epoch, first.state)
         return cls(calibration, truth, truth.exact()[0], epoch, prepared, sigma_px)
@@ -71,7 +71,7 @@ class Bench:
         observations = scene.observations(index, pixels, self.sigma_px)
         same = np.array_equal(index, self.index)
         base = self.epoch if same else epoch_of(self.calibration, observations)
-        righted = put_right(base.with_pixels(pixels, base.reference.drawn(rng)))
+        righted = corrected_epoch(base.with_pixels(pixels, base.reference.drawn(rng)))
         touched = righted.cameras or righted.ids or righted.scales or not same
         diagnosis = diagnose(
             righted.epoch,
@@ -94,9 +94,9 @@ class Disturbed:
 Disturb = Callable[[Scene, np.random.Generator], Disturbed]
 
 
-def _moved(scene: Scene, which: list[int], shift_mm: Floats, turn_rad: Floats) -> Disturbed:
+def _moved(scene: Scene, which: list[int], translation_mm: Floats, turn_rad: Floats) -> Disturbed:
     cameras = list(scene.cameras)
-    for k, shift, turn in zip(which, shift_mm, turn_rad, strict=True):
+    for k, shift, turn in zip(which, translation_mm, turn_rad, strict=True):
         cameras[k] = turned(cameras[k], shift, turn)
     names = frozenset(scene.cameras[k].name for k in which)
     return Disturbed(scene.with_cameras(tuple(cameras)), Kind.CAMERA_MOVED, names)
@@ -230,7 +230,9 @@ def late(milliseconds: float, speed_mm_s: float) -> Disturb:
         for frame, place in enumerate(scene.places[1]):
             shift = speed_mm_s * seconds * unit(rng, 3)
             turn = rotation_of(0.5 * seconds * rng.normal(size=3))
-            seen[camera, frame] = Placed(turn @ place.rotation, place.shift_mm + shift)
+            seen[camera, frame] = RigidTransform(
+                turn @ place.rotation, place.translation_mm + shift
+            )
         name = scene.cameras[camera].name
         return Disturbed(
             replace(scene, seen_otherwise=seen), Kind.UNSYNCHRONISED, frozenset({name})

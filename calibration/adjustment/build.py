@@ -8,18 +8,18 @@ import numpy as np
 
 from calibration.adjustment.camera import CalibratedCamera
 from calibration.adjustment.finite import finite_rows
-from calibration.adjustment.model import Sight
+from calibration.adjustment.initialisation.carrierposes import Placing
+from calibration.adjustment.initialisation.resection import RigidTransform
+from calibration.adjustment.initialisation.views import Placements, spread_rank
+from calibration.adjustment.model import ObservationIndex
 from calibration.adjustment.network import Lengths, Network, Priors
 from calibration.adjustment.options import CalibrationOptions
-from calibration.adjustment.start.places import Placing
-from calibration.adjustment.start.resection import Placed
-from calibration.adjustment.start.views import Placements, spread_rank
 from calibration.adjustment.state import State, camera_arrays
 from calibration.observations import Observations
 from common.errors import InputError
 from geometry.arrays import Bools, Floats, Ints
 
-LOOSE_TURN_RAD = 1.0
+LOOSE_ROTATION_RAD = 1.0
 """Turns of a bar about itself are kept near their start by this; nothing else could."""
 
 
@@ -34,10 +34,10 @@ class Start:
     scale: str
 
 
-def camera_poses(cameras: tuple[CalibratedCamera, ...]) -> dict[int, Placed]:
+def camera_poses(cameras: tuple[CalibratedCamera, ...]) -> dict[int, RigidTransform]:
     """World to camera of given cameras."""
     return {
-        k: Placed(
+        k: RigidTransform(
             c.pose.rotation_rig_to_camera,
             -c.pose.rotation_rig_to_camera @ c.pose.position_rig_mm,
         )
@@ -70,14 +70,16 @@ def build(
     """The network of all usable rows, sorted by camera, and the state to start from."""
     usable = np.flatnonzero(usable_rows(observations, placements, placing))
     rows = usable[np.argsort(observations.camera[usable], kind="stable")]
-    sight = Sight(observations.camera[rows], placements.of_row[rows], observations.target[rows])
+    observed = ObservationIndex(
+        observations.camera[rows], placements.of_row[rows], observations.target[rows]
+    )
     state = _state(cameras, placing)
-    seen = np.bincount(sight.target, minlength=len(state.target)) > 0
-    pose_sigma = _pose_sigma(observations, placements, placing, sight)
+    seen = np.bincount(observed.target, minlength=len(state.target)) > 0
+    pose_sigma = _pose_sigma(observations, placements, placing, observed)
     lengths = _lengths(observations, seen)
     scale = _scale_source(observations, lengths, options)
     network = Network(
-        sight,
+        observed,
         observations.pixel[rows],
         observations.sigma_px[rows],
         _priors(observations, cameras, state, seen, options),
@@ -91,11 +93,11 @@ def build(
 
 
 def _state(cameras: tuple[CalibratedCamera, ...], placing: Placing) -> State:
-    nowhere = Placed(np.eye(3), np.zeros(3))
+    nowhere = RigidTransform(np.eye(3), np.zeros(3))
     placed = [p or nowhere for p in placing.placed]
     return State(
         *camera_arrays(cameras),
-        np.stack([p.shift_mm for p in placed]),
+        np.stack([p.translation_mm for p in placed]),
         np.stack([p.rotation for p in placed]),
         np.nan_to_num(placing.target_mm),
     )
@@ -128,17 +130,17 @@ def _priors(
 
 
 def _pose_sigma(
-    observations: Observations, placements: Placements, placing: Placing, sight: Sight
+    observations: Observations, placements: Placements, placing: Placing, observed: ObservationIndex
 ) -> Floats:
     """Sigmas (k, 6) of the places: held, free, or with turns that nothing observes tied."""
     carrier_of = observations.targets.carrier_of
     out = np.full((len(placing.placed), 6), np.inf)
-    out[np.setdiff1d(np.arange(len(out)), sight.pose)] = 0.0
+    out[np.setdiff1d(np.arange(len(out)), observed.pose)] = 0.0
     for k, carrier in enumerate(observations.targets.carriers):
-        places = np.intersect1d(np.flatnonzero(placements.carrier == k), sight.pose)
+        places = np.intersect1d(np.flatnonzero(placements.carrier == k), observed.pose)
         own = (carrier_of == k) & finite_rows(placing.target_mm)
         if spread_rank(placing.target_mm[own]) < 2:
-            out[places, 3:] = LOOSE_TURN_RAD
+            out[places, 3:] = LOOSE_ROTATION_RAD
         if len(places) and np.isinf(carrier.sigma_mm).any(axis=1).all():
             # A carrier of which nothing is certain takes its frame from one of its places.
             held = [p for p in places if placing.held[p]]
@@ -182,10 +184,12 @@ def _scale_source(observations: Observations, lengths: Lengths, options: Calibra
 
 def some_rows(network: Network, keep: Bools) -> Network:
     """The network with some of its image points (n,) only."""
-    sight = network.sight
+    observed = network.observed
     return replace(
         network,
-        sight=Sight(sight.camera[keep], sight.pose[keep], sight.target[keep]),
+        observed=ObservationIndex(
+            observed.camera[keep], observed.pose[keep], observed.target[keep]
+        ),
         pixel=network.pixel[keep],
         sigma_px=network.sigma_px[keep],
     )

@@ -12,11 +12,13 @@ from calibration.adjustment.components import image_components, prior_components
 from calibration.adjustment.covariance import Covariance
 from calibration.adjustment.crossvalidation import cross_validate
 from calibration.adjustment.finite import finite_rows
+from calibration.adjustment.initialisation.finding import find_start
 from calibration.adjustment.inspection import inspect
 from calibration.adjustment.levenberg import Solution, Stop, adjust
 from calibration.adjustment.network import Network
 from calibration.adjustment.noise import NoiseModel
 from calibration.adjustment.options import CalibrationOptions
+from calibration.adjustment.outliers import late_points, settle
 from calibration.adjustment.plausibility import lengths_must_agree, must_be_plausible
 from calibration.adjustment.quality import (
     Judged,
@@ -30,13 +32,11 @@ from calibration.adjustment.reliability import Reliability, reliability
 from calibration.adjustment.result import (
     Calibration,
     CalibrationQuality,
+    CarrierPose,
     LateView,
-    Place,
     ResidualTable,
 )
-from calibration.adjustment.settling import late_points, settle
 from calibration.adjustment.stages import NEAR_DAMPING, adjust_in_stages
-from calibration.adjustment.start.finding import find_start
 from calibration.observations import Observations
 from common.errors import InputError
 from common.progress import CancelToken, Progress, ProgressCallback, ignore_progress
@@ -117,14 +117,14 @@ def _adjusted(
         covariance = solution.reduction.covariance()
         found = reliability(solution, covariance, network)
         bad, change = settle(solution, network, found, options, not own)
-        settled = not (bad.any() or np.abs(change - 1.0).max() > SETTLED)
-        if settled or round_ == ROUNDS or solution.stop is Stop.STUCK:
+        stable = not (bad.any() or np.abs(change - 1.0).max() > SETTLED)
+        if stable or round_ == ROUNDS or solution.stop is Stop.STUCK:
             break
         late += _views(observations, start, network, late_points(solution, network) & bad)
         rejected = np.concatenate([rejected, start.rows[bad]])
         own = own or bool(np.ptp(change) > 0.0)
-        noise = noise.changed(change, stated, network.sight.camera)
-        network = replace(network, sigma_px=noise.sigmas_px(stated, network.sight.camera))
+        noise = noise.changed(change, stated, network.observed.camera)
+        network = replace(network, sigma_px=noise.sigmas_px(stated, network.observed.camera))
         network, stated = some_rows(network, ~bad), stated[~bad]
         start = replace(start, rows=start.rows[~bad])
         solution = adjust(network, solution.state, near, cancel=cancel)
@@ -138,8 +138,8 @@ def _views(
     observations: Observations, start: Start, network: Network, late: Bools
 ) -> list[LateView]:
     """Which views these points (n,) are of."""
-    sight = network.sight
-    pairs = np.unique(np.stack([sight.camera[late], sight.pose[late]], axis=1), axis=0)
+    observed = network.observed
+    pairs = np.unique(np.stack([observed.camera[late], observed.pose[late]], axis=1), axis=0)
     frames = start.placements.frame
     return [
         LateView(
@@ -165,7 +165,7 @@ def _result(
     network, solution = done.network, done.solution
     sizes = tuple((int(w), int(h)) for w, h in observations.image_size_px)
     cameras = solution.state.cameras(observations.cameras, sizes)
-    seen = np.bincount(network.sight.target, minlength=network.target_count) > 0
+    seen = np.bincount(network.observed.target, minlength=network.target_count) > 0
     seen |= finite_rows(network.priors.target_sigma) & (network.priors.target_sigma > 0.0).any(
         axis=1
     )
@@ -182,17 +182,17 @@ def _result(
     )
 
 
-def _places(observations: Observations, done: _Adjusted) -> tuple[Place, ...]:
+def _places(observations: Observations, done: _Adjusted) -> tuple[CarrierPose, ...]:
     placements, state = done.start.placements, done.solution.state
     names = [c.name for c in observations.targets.carriers]
     return tuple(
-        Place(
+        CarrierPose(
             names[int(placements.carrier[k])],
             None if placements.frame[k] < 0 else observations.frames[int(placements.frame[k])],
             state.position[k],
             state.attitude[k],
         )
-        for k in np.unique(done.network.sight.pose)
+        for k in np.unique(done.network.observed.pose)
     )
 
 

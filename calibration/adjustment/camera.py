@@ -9,11 +9,16 @@ import numpy as np
 
 from common.errors import InputError
 from geometry.arrays import Floats, frozen
-from geometry.camera import NO_DISTORTION, RigCamera, distort, undistort
+from geometry.camera import (
+    INTERIOR_NAMES,
+    NO_DISTORTION,
+    RigCamera,
+    distort,
+    interior_vector,
+    perspective,
+    undistort,
+)
 from geometry.frames import Pose
-
-INTERIOR_NAMES = ("f", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "b1")
-"""Interior parameters in their order everywhere: px, px, px, then without unit."""
 
 POSE_NAMES = ("x", "y", "z", "rx", "ry", "rz")
 """Exterior parameters: projection centre, mm, and turn about the camera's axes, radians."""
@@ -57,8 +62,8 @@ class Interior:
     @property
     def vector(self) -> Floats:
         """The parameters (9,) in the order of :data:`INTERIOR_NAMES`."""
-        return np.array(
-            [self.focal_length_px, *self.principal_point_px, *self.distortion, self.affinity]
+        return interior_vector(
+            self.focal_length_px, self.principal_point_px, self.distortion, self.affinity
         )
 
     @classmethod
@@ -101,14 +106,11 @@ class CalibratedCamera:
 
     def project(self, points_rig_mm: Floats) -> Floats:
         """Pixels (n, 2) of points (n, 3); NaN behind the camera."""
-        local = self.pose.to_camera(points_rig_mm)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            normalised = np.where(local[:, 2:] > 0.0, local[:, :2] / local[:, 2:], np.nan)
-        return self.interior.pixels(normalised)
+        return self.interior.pixels(perspective(self.pose.to_camera(points_rig_mm)))
 
     def rays(self, pixels: Floats) -> Floats:
         """Unit directions (n, 3) in the rig frame of pixels (n, 2)."""
-        ways = np.ones((len(pixels), 3))
-        ways[:, :2] = self.interior.normalised(pixels)
-        ways /= np.linalg.norm(ways, axis=1, keepdims=True)
-        return np.asarray(ways @ self.pose.rotation_rig_to_camera)
+        directions = np.ones((len(pixels), 3))
+        directions[:, :2] = self.interior.normalised(pixels)
+        directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+        return np.asarray(directions @ self.pose.rotation_rig_to_camera)

@@ -88,10 +88,10 @@ def _interiors(solution: Solution, network: Network, covariance: Covariance) -> 
 
 def length_partials(target: Floats, first: Ints, second: Ints) -> Floats:
     """Partials (d, m, 3) of distances between targets ``first`` and ``second`` (d,)."""
-    way = target[second] - target[first]
-    way = way / np.linalg.norm(way, axis=1, keepdims=True)
-    rows, number = np.zeros((len(way), len(target), 3)), np.arange(len(way))
-    rows[number, second], rows[number, first] = way, -way
+    direction = target[second] - target[first]
+    direction = direction / np.linalg.norm(direction, axis=1, keepdims=True)
+    rows, number = np.zeros((len(direction), len(target), 3)), np.arange(len(direction))
+    rows[number, second], rows[number, first] = direction, -direction
     return rows
 
 

@@ -27,8 +27,8 @@ def _halves(network: Network, frame: Ints) -> tuple[Bools, Bools, str]:
         odd = np.isin(frame, frames[::2])
         return odd, ~odd, "every other frame"
     # Targets with measured distances are in both: they may be all that tells the size.
-    both = np.isin(network.sight.target, network.kept)
-    even = network.sight.target % 2 == 0
+    both = np.isin(network.observed.target, network.kept)
+    even = network.observed.target % 2 == 0
     return even | both, ~even | both, "every other target"
 
 
@@ -44,7 +44,7 @@ def cross_validate(
     *halves, words = _halves(network, frame)
     parts = []
     for half in halves:
-        counts = np.bincount(network.sight.camera[half], minlength=network.camera_count)
+        counts = np.bincount(network.observed.camera[half], minlength=network.camera_count)
         if counts.min() < LEAST_PER_CAMERA:
             return None
         found = _solved(_alone(some_rows(network, half)), state, loss)
@@ -59,10 +59,10 @@ def _alone(network: Network) -> Network:
     """A half in which what it does not determine is held, and seen by nobody."""
     sigma = network.priors.target_sigma
     unknown = np.isinf(sigma).any(axis=1)
-    rays = np.bincount(network.sight.target, minlength=network.target_count)
-    network = some_rows(network, ~(unknown & (rays < 2))[network.sight.target])
-    unseen = unknown & (np.bincount(network.sight.target, minlength=len(rays)) == 0)
-    poses = np.bincount(network.sight.pose, minlength=network.pose_count) == 0
+    rays = np.bincount(network.observed.target, minlength=network.target_count)
+    network = some_rows(network, ~(unknown & (rays < 2))[network.observed.target])
+    unseen = unknown & (np.bincount(network.observed.target, minlength=len(rays)) == 0)
+    poses = np.bincount(network.observed.pose, minlength=network.pose_count) == 0
     pose_sigma = network.pose_sigma.copy()
     pose_sigma[poses] = 0.0
     priors = replace(network.priors, target_sigma=np.where(unseen[:, None], 0.0, sigma))
@@ -79,12 +79,12 @@ def _solved(network: Network, state: State, loss: LossOptions) -> tuple[Floats, 
     moved = np.zeros((network.camera_count, covariance.shape[0] // network.camera_count))
     moved[:, :9] = solution.state.interior - state.interior
     moved[:, 9:12] = solution.state.centre - state.centre
-    turn = solution.state.rotation @ np.swapaxes(state.rotation, 1, 2)
+    rotation = solution.state.rotation @ np.swapaxes(state.rotation, 1, 2)
     moved[:, 12:] = 0.5 * np.stack(
         [
-            turn[:, 2, 1] - turn[:, 1, 2],
-            turn[:, 0, 2] - turn[:, 2, 0],
-            turn[:, 1, 0] - turn[:, 0, 1],
+            rotation[:, 2, 1] - rotation[:, 1, 2],
+            rotation[:, 0, 2] - rotation[:, 2, 0],
+            rotation[:, 1, 0] - rotation[:, 0, 1],
         ],
         axis=1,
     )

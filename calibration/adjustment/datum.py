@@ -32,8 +32,8 @@ def shift_space(state: State, scaled: bool) -> Floats:
 
 def reach_mm(state: State, network: Network) -> float:
     """Mean distance of the cameras from what they see: turns are weighed by it, mm."""
-    points = state.points_rig_mm(network.sight.pose, network.sight.target)
-    away = points - state.centre[network.sight.camera]
+    points = state.points_rig_mm(network.observed.pose, network.observed.target)
+    away = points - state.centre[network.observed.camera]
     return float(np.linalg.norm(away, axis=1).mean())
 
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from calibration.adjustment.camera import PER_CAMERA, CalibratedCamera
 from calibration.adjustment.finite import finite_rows
-from calibration.adjustment.model import Sight, partials
-from calibration.adjustment.start.rays import nearest_points
+from calibration.adjustment.initialisation.rays import nearest_points
+from calibration.adjustment.model import ObservationIndex, partials
 from calibration.adjustment.state import State, camera_arrays
 from geometry.arrays import Bools, Floats, Ints
 
@@ -49,7 +49,7 @@ def intersected(
     good = finite_rows(start)
     keep = good[point]
     camera, point, pixel, sigma_px = camera[keep], point[keep], pixel[keep], sigma_px[keep]
-    sight = Sight(camera, np.zeros_like(camera), point)
+    observed = ObservationIndex(camera, np.zeros_like(camera), point)
     state = State(
         *camera_arrays(cameras),
         np.zeros((1, 3)),
@@ -58,7 +58,7 @@ def intersected(
     )
     normal = np.zeros((count, 3, 3))
     for _ in range(ITERATIONS):
-        parts = partials(state, sight)
+        parts = partials(state, observed)
         rows = parts.target / sigma_px[:, :, None]
         normal, right = np.zeros((count, 3, 3)), np.zeros((count, 3))
         across = np.swapaxes(rows, 1, 2)
@@ -69,33 +69,35 @@ def intersected(
         state = state.moved(np.zeros(PER_CAMERA * len(cameras) + 6), step)
         if np.abs(step).max(initial=0.0) < STILL_MM:
             break
-    return _finished(state, sight, sigma_px, normal, good)
+    return _finished(state, observed, sigma_px, normal, good)
 
 
 def _start(
     cameras: tuple[CalibratedCamera, ...], camera: Ints, point: Ints, pixel: Floats, count: int
 ) -> Floats:
-    origins, ways = np.empty((len(camera), 3)), np.empty((len(camera), 3))
+    origins, directions = np.empty((len(camera), 3)), np.empty((len(camera), 3))
     for k, one in enumerate(cameras):
         own = camera == k
-        origins[own], ways[own] = one.pose.position_rig_mm, one.rays(pixel[own])
-    return nearest_points(origins, ways, point, count)
+        origins[own], directions[own] = one.pose.position_rig_mm, one.rays(pixel[own])
+    return nearest_points(origins, directions, point, count)
 
 
-def _finished(state: State, sight: Sight, sigma_px: Floats, normal: Floats, good: Bools) -> Points:
-    parts = partials(state, sight)
+def _finished(
+    state: State, observed: ObservationIndex, sigma_px: Floats, normal: Floats, good: Bools
+) -> Points:
+    parts = partials(state, observed)
     covariance = np.linalg.inv(normal)
     rows = parts.target / sigma_px[:, :, None]
-    pull = covariance[sight.target] @ np.swapaxes(rows, 1, 2)
+    pull = covariance[observed.target] @ np.swapaxes(rows, 1, 2)
     effect = -pull @ (parts.camera / sigma_px[:, :, None])
     count = len(good)
     cameras = len(state.interior)
     by_pair = np.zeros((count * cameras, 3, PER_CAMERA))
-    np.add.at(by_pair, sight.target * cameras + sight.camera, effect)
+    np.add.at(by_pair, observed.target * cameras + observed.camera, effect)
     by_cameras = np.swapaxes(by_pair.reshape(count, cameras, 3, PER_CAMERA), 1, 2)
     return Points(
         np.where(good[:, None], state.target, np.nan),
         np.where(good[:, None, None], covariance, np.nan),
         by_cameras.reshape(count, 3, -1),
-        np.bincount(sight.target, minlength=count),
+        np.bincount(observed.target, minlength=count),
     )

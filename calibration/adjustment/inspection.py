@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from calibration.adjustment.finite import finite_rows
-from calibration.adjustment.start.views import Placements, View, is_planar, views_of
+from calibration.adjustment.initialisation.views import Placements, View, is_planar, views_of
 from calibration.observations import Observations
 from common.errors import InputError
 from geometry.arrays import Floats

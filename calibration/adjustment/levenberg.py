@@ -83,7 +83,7 @@ def _limit(misfit: Floats, options: LossOptions) -> float:
 
 
 def _cost(state: State, network: Network, limit: float) -> float:
-    pixel, depth = project(state, network.sight)
+    pixel, depth = project(state, network.observed)
     # A camera that a step put beyond its targets would see mirrored points: no such step.
     if not np.isfinite(pixel).all() or float(depth.min(initial=1.0)) <= 0.0:
         return np.inf

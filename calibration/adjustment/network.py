@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from calibration.adjustment.camera import PER_CAMERA
-from calibration.adjustment.model import Sight
+from calibration.adjustment.model import ObservationIndex
 from geometry.arrays import Bools, Floats, Ints
 
 
@@ -46,14 +46,14 @@ NO_LENGTHS = Lengths(np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0), 
 class Network:
     """One adjustment.
 
-    ``sight`` (n,), ``pixel`` and ``sigma_px`` (n, 2): the image points, sorted by camera.
+    ``observed`` (n,), ``pixel`` and ``sigma_px`` (n, 2): the image points, sorted by camera.
     ``pose_sigma`` (k, 6), mm and radians, of the places of carriers about their start: 0 holds
     one fast (it then defines the frame of an unknown carrier), a finite value only keeps turns
     that nothing observes, such as a bar's about itself, where they are.
     ``datum``: whether the frame is free, and ``datum_scale``: whether the scale is, too.
     """
 
-    sight: Sight
+    observed: ObservationIndex
     pixel: Floats
     sigma_px: Floats
     priors: Priors
@@ -129,4 +129,4 @@ class Network:
     @cached_property
     def camera_rows(self) -> Ints:
         """Where the image points of each camera begin and end, (n + 1,)."""
-        return np.searchsorted(self.sight.camera, np.arange(self.camera_count + 1))
+        return np.searchsorted(self.observed.camera, np.arange(self.camera_count + 1))

@@ -61,8 +61,8 @@ def _differences(state: State, network: Network) -> tuple[Floats, Floats]:
 def residuals(state: State, network: Network, pixel: Floats, depth: Floats) -> Residuals:
     """All residuals, with the computed pixels and depths already at hand."""
     priors = network.priors
-    turn = state.rotation @ np.swapaxes(priors.rotation, 1, 2)
-    exterior = np.concatenate([priors.centre - state.centre, -vector_of(turn)], axis=1)
+    rotation = state.rotation @ np.swapaxes(priors.rotation, 1, 2)
+    exterior = np.concatenate([priors.centre - state.centre, -vector_of(rotation)], axis=1)
     _, computed = _differences(state, network)
     return Residuals(
         network.pixel - pixel,
@@ -76,7 +76,7 @@ def residuals(state: State, network: Network, pixel: Floats, depth: Floats) -> R
 
 def all_residuals(state: State, network: Network) -> Residuals:
     """All residuals of a state."""
-    return residuals(state, network, *project(state, network.sight))
+    return residuals(state, network, *project(state, network.observed))
 
 
 def prior_cost(found: Residuals, network: Network) -> float:
@@ -102,34 +102,34 @@ class Assembler:
 
     def __init__(self, network: Network) -> None:
         self._network = network
-        sight, m = network.sight, network.target_count
+        observed, m = network.observed, network.target_count
         self._offset = PER_CAMERA * network.camera_count
         self._moving = bool((network.pose_sigma > 0.0).any())
-        self._camera_target = _flat_index(sight.camera, PER_CAMERA, sight.target, 3, 3 * m)
-        self._targets = _flat_index(sight.target, 3, np.zeros_like(sight.target), 3, 3)
+        self._camera_target = _flat_index(observed.camera, PER_CAMERA, observed.target, 3, 3 * m)
+        self._targets = _flat_index(observed.target, 3, np.zeros_like(observed.target), 3, 3)
         self._camera_mask = network.camera_free.astype(np.float64)
         self._target_mask = network.target_free.astype(np.float64)
         self._pose_mask = (network.pose_sigma > 0.0).astype(np.float64)
         if self._moving:
             k = network.pose_count
-            self._pose_target = _flat_index(sight.pose, 6, sight.target, 3, 3 * m)
-            self._camera_pose = _flat_index(sight.camera, PER_CAMERA, sight.pose, 6, 6 * k)
-            self._poses = _flat_index(sight.pose, 6, np.zeros_like(sight.pose), 6, 6)
+            self._pose_target = _flat_index(observed.pose, 6, observed.target, 3, 3 * m)
+            self._camera_pose = _flat_index(observed.camera, PER_CAMERA, observed.pose, 6, 6 * k)
+            self._poses = _flat_index(observed.pose, 6, np.zeros_like(observed.pose), 6, 6)
 
     def masked(self, parts: Partials) -> Partials:
         """Partials with nothing by what is held fast."""
-        sight = self._network.sight
+        observed = self._network.observed
         return Partials(
             parts.pixel,
             parts.depth,
-            parts.camera * self._camera_mask[sight.camera][:, None, :],
-            parts.pose * self._pose_mask[sight.pose][:, None, :],
-            parts.target * self._target_mask[sight.target][:, None, :],
+            parts.camera * self._camera_mask[observed.camera][:, None, :],
+            parts.pose * self._pose_mask[observed.pose][:, None, :],
+            parts.target * self._target_mask[observed.target][:, None, :],
         )
 
     def linearise(self, state: State) -> tuple[Partials, Residuals]:
         """Partials and residuals at ``state``."""
-        parts = self.masked(partials(state, self._network.sight))
+        parts = self.masked(partials(state, self._network.observed))
         return parts, residuals(state, self._network, parts.pixel, parts.depth)
 
     def gather(self, parts: Partials, found: Residuals, weights: Floats) -> Normals:
@@ -153,9 +153,9 @@ class Assembler:
             core[place, place] = part.T @ part
             core_right[place] = part.T @ misfit[rows[c] : rows[c + 1]].ravel()
         cross = np.zeros((core_count, m, 3))
-        turned = np.swapaxes(camera, 1, 2)
+        rotated = np.swapaxes(camera, 1, 2)
         cross[: self._offset] = self._sum(
-            self._camera_target, turned @ target, (self._offset, m, 3)
+            self._camera_target, rotated @ target, (self._offset, m, 3)
         )
         if self._moving:
             self._add_carriers(core, cross, core_right, camera, pose, target, misfit)
@@ -164,7 +164,7 @@ class Assembler:
         right = np.zeros((m, 3))
         for axis in range(3):
             both = np.einsum("na,na->n", target[:, :, axis], misfit)
-            right[:, axis] = np.bincount(network.sight.target, both, minlength=m)
+            right[:, axis] = np.bincount(network.observed.target, both, minlength=m)
         return Normals(core, cross, blocks, core_right, right)
 
     def _add_carriers(
@@ -178,16 +178,16 @@ class Assembler:
         misfit: Floats,
     ) -> None:
         k, m, o = self._network.pose_count, self._network.target_count, self._offset
-        turned = np.swapaxes(pose, 1, 2)
-        cross[o:] = self._sum(self._pose_target, turned @ target, (6 * k, m, 3))
+        rotated = np.swapaxes(pose, 1, 2)
+        cross[o:] = self._sum(self._pose_target, rotated @ target, (6 * k, m, 3))
         mixed = self._sum(self._camera_pose, np.swapaxes(camera, 1, 2) @ pose, (o, 6 * k))
         core[:o, o:], core[o:, :o] = mixed, mixed.T
-        blocks = self._sum(self._poses, turned @ pose, (k, 6, 6))
+        blocks = self._sum(self._poses, rotated @ pose, (k, 6, 6))
         for j in range(k):
             core[o + 6 * j : o + 6 * j + 6, o + 6 * j : o + 6 * j + 6] += blocks[j]
         sides = np.einsum("nap,na->np", pose, misfit)
         for axis in range(6):
-            sums = np.bincount(self._network.sight.pose, sides[:, axis], minlength=k)
+            sums = np.bincount(self._network.observed.pose, sides[:, axis], minlength=k)
             right[o + axis :: 6] += sums
 
     @staticmethod

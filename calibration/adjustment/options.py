@@ -7,10 +7,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from calibration.adjustment.camera import INTERIOR_NAMES, CalibratedCamera, Interior
+from calibration.adjustment.camera import CalibratedCamera, Interior
 from calibration.adjustment.levenberg import LossOptions
 from common.errors import InputError
 from geometry.arrays import Floats
+from geometry.camera import INTERIOR_NAMES
 
 FREE = float("inf")
 FIXED = 0.0

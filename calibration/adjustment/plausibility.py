@@ -7,10 +7,10 @@ import numpy as np
 from calibration.adjustment.build import Start, camera_poses
 from calibration.adjustment.covariance import Covariance
 from calibration.adjustment.datum import reach_mm
+from calibration.adjustment.initialisation.frame import centre_of
 from calibration.adjustment.levenberg import Solution
 from calibration.adjustment.network import Network
 from calibration.adjustment.options import CalibrationOptions
-from calibration.adjustment.start.frame import centre_of
 from calibration.observations import Observations
 from common.errors import InputError
 
@@ -38,10 +38,10 @@ def must_be_plausible(
 
 
 def _fits(observations: Observations, network: Network, solution: Solution) -> None:
-    off = np.linalg.norm(solution.residuals.pixel, axis=1)
+    residual = np.linalg.norm(solution.residuals.pixel, axis=1)
     rows = network.camera_rows
     for k, name in enumerate(observations.cameras):
-        own = off[rows[k] : rows[k + 1]]
+        own = residual[rows[k] : rows[k + 1]]
         width = float(observations.image_size_px[k, 0])
         if len(own) and np.median(own) > WORST_RMS_SHARE * width:
             raise InputError(

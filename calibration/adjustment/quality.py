@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calibration.adjustment.camera import INTERIOR, INTERIOR_NAMES, POSE_NAMES, CalibratedCamera
+from calibration.adjustment.camera import INTERIOR, POSE_NAMES, CalibratedCamera
 from calibration.adjustment.components import Component
 from calibration.adjustment.covariance import Covariance
 from calibration.adjustment.datum import reach_mm
@@ -21,6 +21,7 @@ from calibration.adjustment.result import (
     LateView,
     WeakParameter,
 )
+from geometry.camera import INTERIOR_NAMES
 
 WEAK_PRIOR_SHARE = 0.5
 STRONG_CORRELATION = 0.98

@@ -45,11 +45,11 @@ def _length_rows(state: State, network: Network, weights: Floats) -> tuple[Float
     lengths = network.lengths
     between = state.target[lengths.second] - state.target[lengths.first]
     computed = np.linalg.norm(between, axis=1)
-    way = between / (computed * lengths.sigma_mm)[:, None]
+    direction = between / (computed * lengths.sigma_mm)[:, None]
     rows = np.zeros((len(computed), len(network.kept), 3))
     number = np.arange(len(computed))
-    rows[number, np.searchsorted(network.kept, lengths.second)] = way
-    rows[number, np.searchsorted(network.kept, lengths.first)] = -way
+    rows[number, np.searchsorted(network.kept, lengths.second)] = direction
+    rows[number, np.searchsorted(network.kept, lengths.first)] = -direction
     rows *= network.target_free[network.kept] * root[:, None, None]
     return rows, root * (lengths.length_mm - computed) / lengths.sigma_mm
 

@@ -36,21 +36,21 @@ class Reliability:
 
 def _fitted_covariance(solution: Solution, covariance: Covariance, network: Network) -> Floats:
     """Covariance (n, 2, 2) of the adjusted image points, px^2."""
-    size, parts, sight = len(covariance.core), solution.partials, network.sight
+    size, parts, observed = len(covariance.core), solution.partials, network.observed
     rows = covariance.target_rows().reshape(-1, 3, size)
     own = covariance.own_blocks()
     out = np.empty((len(network.pixel), 2, 2))
     for begin in range(0, len(out), CHUNK):
         part = slice(begin, begin + CHUNK)
-        line = parts.target[part] @ rows[sight.target[part]]
-        _add(line, parts.camera[part], PER_CAMERA * sight.camera[part], PER_CAMERA)
+        line = parts.target[part] @ rows[observed.target[part]]
+        _add(line, parts.camera[part], PER_CAMERA * observed.camera[part], PER_CAMERA)
         if network.pose_count:
             first = PER_CAMERA * network.camera_count
-            _add(line, parts.pose[part], first + 6 * sight.pose[part], 6)
+            _add(line, parts.pose[part], first + 6 * observed.pose[part], 6)
         product = (line.reshape(-1, size) @ covariance.core).reshape(line.shape)
         inner = np.einsum("nar,nbr->nab", product, line)
         by_target = parts.target[part]
-        out[part] = inner + by_target @ own[sight.target[part]] @ np.swapaxes(by_target, 1, 2)
+        out[part] = inner + by_target @ own[observed.target[part]] @ np.swapaxes(by_target, 1, 2)
     return out
 
 

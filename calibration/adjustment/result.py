@@ -18,7 +18,7 @@ from geometry.arrays import Floats, Ints, frozen
 
 
 @dataclass(frozen=True, eq=False)
-class Place:
+class CarrierPose:
     """Where a carrier stood: in ``frame``, or in all of them when it is None.
 
     ``X_rig = rotation_carrier_to_rig x + position_rig_mm``.
@@ -152,7 +152,7 @@ class Calibration:
     cameras: tuple[CalibratedCamera, ...]
     targets: TargetSet
     target_mm: Floats
-    places: tuple[Place, ...]
+    places: tuple[CarrierPose, ...]
     covariance: Covariance
     noise: NoiseModel
     datum: str
@@ -174,9 +174,9 @@ class Calibration:
         """Distance of two targets of one carrier and its sigma, mm."""
         ids = self.targets.ids
         a, b = ids.index(first), ids.index(second)
-        way = self.target_mm[b] - self.target_mm[a]
+        direction = self.target_mm[b] - self.target_mm[a]
         rows = np.zeros((1, len(ids), 3))
-        length = float(np.linalg.norm(way))
-        rows[0, b], rows[0, a] = way / length, -way / length
+        length = float(np.linalg.norm(direction))
+        rows[0, b], rows[0, a] = direction / length, -direction / length
         nothing = np.zeros((1, PER_CAMERA * len(self.cameras)))
         return length, float(np.sqrt(self.covariance.of_functions(nothing, rows)[0, 0]))

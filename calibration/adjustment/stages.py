@@ -9,11 +9,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from calibration.adjustment.camera import INTERIOR_NAMES
 from calibration.adjustment.levenberg import LossOptions, Solution, adjust
 from calibration.adjustment.network import Network
 from calibration.adjustment.state import State
 from common.progress import CancelToken, ProgressCallback, ignore_progress
+from geometry.camera import INTERIOR_NAMES
 
 UNKNOWN_LENSES = ("f", "k1")
 """What the first stage frees of lenses of which nothing is known."""

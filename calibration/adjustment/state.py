@@ -44,8 +44,8 @@ class State:
 
     def points_rig_mm(self, pose: Ints, target: Ints) -> Floats:
         """Targets in the rig frame (n, 3); ``pose`` and ``target`` (n,) index carriers, targets."""
-        turned = np.einsum("nij,nj->ni", self.attitude[pose], self.target[target])
-        return np.asarray(turned + self.position[pose])
+        rotated = np.einsum("nij,nj->ni", self.attitude[pose], self.target[target])
+        return np.asarray(rotated + self.position[pose])
 
     def cameras(
         self, names: tuple[str, ...], sizes_px: tuple[tuple[int, int], ...]

@@ -44,13 +44,13 @@ def agreeing(epoch: Epoch, start: Consensus) -> tuple[Consensus, tuple[int, ...]
     No camera is named when all are off, or none, or when fewer than two would be left.
     """
     limit = OFF_SIGMAS * float(np.median(epoch.sigma_px))
-    off = by_camera(epoch, misfit_px(epoch, start.state)) > limit
-    if not off.any():
+    residual = by_camera(epoch, misfit_px(epoch, start.state)) > limit
+    if not residual.any():
         return start, ()
-    others = np.flatnonzero(~off)
+    others = np.flatnonzero(~residual)
     again = consensus(epoch, among=others)
     left = by_camera(epoch, misfit_px(epoch, again.state)) > limit
-    if 2 * len(others) > len(off) and not left[others].any():
+    if 2 * len(others) > len(residual) and not left[others].any():
         return again, tuple(int(k) for k in np.flatnonzero(left))
     found = [c for c in (_of_pair(epoch, a, b, limit) for a, b in _pairs(epoch)) if c is not None]
     if not found:
@@ -74,13 +74,13 @@ def _of_pair(epoch: Epoch, first: int, second: int, limit: float) -> _Candidate 
     pair = np.array([first, second])
     found = consensus(epoch, among=pair)
     # Places that the two cannot see together say nothing.
-    told = np.isfinite(found.scale)[epoch.place]
-    off = by_camera(epoch, misfit_px(epoch, found.state), told)
-    own = float(off[pair].max())
-    strange = off > max(limit, OFF_RATIO * own)
-    if not told.any() or own > limit or len(off) - strange.sum() < 2:
+    reported = np.isfinite(found.scale)[epoch.place]
+    residual = by_camera(epoch, misfit_px(epoch, found.state), reported)
+    own = float(residual[pair].max())
+    strange = residual > max(limit, OFF_RATIO * own)
+    if not reported.any() or own > limit or len(residual) - strange.sum() < 2:
         return None
-    return _Candidate(found, strange, float(np.minimum(off[~strange], CAP_PX).sum()))
+    return _Candidate(found, strange, float(np.minimum(residual[~strange], CAP_PX).sum()))
 
 
 def _likeliest(epoch: Epoch, candidates: list[_Candidate]) -> _Candidate:

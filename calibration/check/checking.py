@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calibration.adjustment.result import Calibration
-from calibration.check import words
+from calibration.check import messages as words
 from calibration.check.diagnosis import Diagnosis, diagnose
 from calibration.check.effects import effects
 from calibration.check.epoch import Epoch, epoch_of
 from calibration.check.findings import findings, scale_estimate
-from calibration.check.gross import Righted, put_right
+from calibration.check.gross import Corrected, corrected_epoch
 from calibration.check.hypotheses import ALPHA, Cause
 from calibration.check.tables import (
     LEAST_POINTS,
@@ -72,13 +72,13 @@ def check(
     epoch = epoch_of(reference, observations)
     _go_on(cancel)
     progress(Progress("gross faults", 0.2))
-    righted = put_right(epoch)
+    corrected = corrected_epoch(epoch)
     _go_on(cancel)
     progress(Progress("tests", 0.4))
-    diagnosis = diagnose(righted.epoch, righted.start.state, righted.suspects)
+    diagnosis = diagnose(corrected.epoch, corrected.start.state, corrected.suspects)
     _go_on(cancel)
     progress(Progress("verdict", 0.9))
-    return judge(reference, observations, epoch, righted, diagnosis, options or CheckOptions())
+    return judge(reference, observations, epoch, corrected, diagnosis, options or CheckOptions())
 
 
 def _go_on(cancel: CancelToken) -> None:
@@ -90,25 +90,25 @@ def judge(
     reference: Calibration,
     observations: Observations,
     epoch: Epoch,
-    righted: Righted,
+    corrected: Corrected,
     diagnosis: Diagnosis,
     options: CheckOptions,
 ) -> CheckResult:
     """All tables and findings of a finished diagnosis."""
     found = effects(diagnosis.epoch, diagnosis.first.state)
     noise = noise_of(diagnosis)
-    alarms = [_weighed(f, options) for f in findings(righted, diagnosis, found)]
+    alarms = [_weighed(f, options) for f in findings(corrected, diagnosis, found)]
     cameras = camera_checks(diagnosis, found, noise, options.hidden_limit_mm)
-    told = verdicts(alarms, cameras, noise, diagnosis)
+    reported = verdicts(alarms, cameras, noise, diagnosis)
     scale, scale_sigma = _scale(diagnosis)
     distances = reference.targets.distances or observations.targets.distances
     residual = diagnosis.first.v * _sigmas(diagnosis)
     return CheckResult(
-        _light(told),
-        told,
+        _light(reported),
+        reported,
         cameras,
-        carrier_checks(diagnosis, reference, told),
-        length_checks(diagnosis, righted.start, distances, scale_sigma),
+        carrier_checks(diagnosis, reference, reported),
+        length_checks(diagnosis, corrected.start, distances, scale_sigma),
         diagnosis.first.chi2,
         2 * len(diagnosis.first.v) - 6 * len(epoch.place_carrier),
         float(np.sqrt(np.mean(residual**2))),
@@ -135,8 +135,8 @@ def _sigmas(diagnosis: Diagnosis) -> np.ndarray[tuple[int, int], np.dtype[np.flo
     return diagnosis.first.linear.epoch.sigma_px
 
 
-def _light(told: tuple[Finding, ...]) -> Light:
-    lights = {f.light for f in told}
+def _light(reported: tuple[Finding, ...]) -> Light:
+    lights = {f.light for f in reported}
     for light in (Light.RED, Light.YELLOW):
         if light in lights:
             return light
@@ -158,16 +158,16 @@ def verdicts(
     diagnosis: Diagnosis,
 ) -> tuple[Finding, ...]:
     """Alarms, then doubts; or that all is fine."""
-    told = list(alarms)
+    reported = list(alarms)
     names = diagnosis.epoch.camera_names
     freedom = 2 * len(diagnosis.last.v)
     ratio = float(np.sqrt(diagnosis.last.chi2 / max(freedom, 1)))
     if ratio > UNEXPLAINED and not diagnosis.nobody_stands:
-        told.insert(0, Finding(Kind.UNEXPLAINED, names, words.unexplained(ratio), value=ratio))
+        reported.insert(0, Finding(Kind.UNEXPLAINED, names, words.unexplained(ratio), value=ratio))
     else:
         for k in np.flatnonzero(noise.raised()):
             factor = float(noise.factor[k])
-            told.append(
+            reported.append(
                 Finding(
                     Kind.NOISE_RAISED,
                     (names[k],),
@@ -177,12 +177,12 @@ def verdicts(
                 )
             )
     if not diagnosis.nobody_stands:
-        told += _doubts(cameras)
-    if not told:
+        reported += _doubts(cameras)
+    if not reported:
         hidden = max(c.sensitivity.hidden_mm for c in cameras if c.sensitivity)
         hidden *= power95_factor(diagnosis)
-        told.append(Finding(Kind.FINE, names, words.fine(len(names), hidden), effect_mm=hidden))
-    return tuple(told)
+        reported.append(Finding(Kind.FINE, names, words.fine(len(names), hidden), effect_mm=hidden))
+    return tuple(reported)
 
 
 def _doubts(cameras: tuple[CameraCheck, ...]) -> list[Finding]:

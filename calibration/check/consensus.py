@@ -8,10 +8,10 @@ import numpy as np
 
 from calibration.adjustment.camera import Interior
 from calibration.adjustment.finite import finite_rows
+from calibration.adjustment.initialisation.rays import nearest_points
+from calibration.adjustment.initialisation.resection import placed_candidates
 from calibration.adjustment.model import project
 from calibration.adjustment.rotations import similarity
-from calibration.adjustment.start.rays import nearest_points
-from calibration.adjustment.start.resection import placed_candidates
 from calibration.adjustment.state import State
 from calibration.check.epoch import Epoch
 from calibration.check.linear import sight_of
@@ -44,16 +44,16 @@ def consensus(epoch: Epoch, assigned: Ints | None = None, among: Ints | None = N
     """
     reference, camera = epoch.reference, epoch.camera
     used = camera if assigned is None else assigned[camera]
-    origins, ways = _rays(epoch, used)
+    origins, directions = _rays(epoch, used)
     focal = reference.interior[used, 0]
     places, targets = len(epoch.place_carrier), len(epoch.target_names)
     heard = np.ones(len(used)) if among is None else np.isin(camera, among).astype(np.float64)
     weights = heard
     for _ in range(ROUNDS):
-        points = nearest_points(origins, ways, epoch.points, places * targets, weights)
-        off = _miss_px(points[epoch.points] - origins, ways, focal)
+        points = nearest_points(origins, directions, epoch.points, places * targets, weights)
+        residual = _miss_px(points[epoch.points] - origins, directions, focal)
         # Weights that fall with the distance make it the least sum of distances, not of squares.
-        weights = heard / np.maximum(np.nan_to_num(off, nan=1e6), FLOOR_PX)
+        weights = heard / np.maximum(np.nan_to_num(residual, nan=1e6), FLOOR_PX)
     found = points.reshape(places, targets, 3)
     placed = [
         _placed(epoch, found, k)
@@ -82,18 +82,18 @@ def _taken_by(state: State, assigned: Ints | None) -> State:
 
 def _rays(epoch: Epoch, used: Ints) -> tuple[Floats, Floats]:
     reference = epoch.reference
-    ways = np.ones((len(used), 3))
+    directions = np.ones((len(used), 3))
     for k in np.unique(used):
         own = used == k
-        ways[own, :2] = Interior.of(reference.interior[k]).normalised(epoch.pixel[own])
-        ways[own] = ways[own] @ reference.rotation[k]
-    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
-    return reference.centre[used], ways
+        directions[own, :2] = Interior.of(reference.interior[k]).normalised(epoch.pixel[own])
+        directions[own] = directions[own] @ reference.rotation[k]
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    return reference.centre[used], directions
 
 
-def _miss_px(arms: Floats, ways: Floats, focal_px: Floats) -> Floats:
-    along = np.einsum("ni,ni->n", arms, ways)
-    aside = np.linalg.norm(arms - along[:, None] * ways, axis=1)
+def _miss_px(offsets: Floats, directions: Floats, focal_px: Floats) -> Floats:
+    along = np.einsum("ni,ni->n", offsets, directions)
+    aside = np.linalg.norm(offsets - along[:, None] * directions, axis=1)
     return np.where(along > 0.0, aside / np.where(along > 0.0, along, 1.0) * focal_px, 1e6)
 
 
@@ -118,7 +118,7 @@ def _resected(epoch: Epoch, used: Ints, heard: Floats, place: int) -> _Placed | 
         found, key=lambda p: float(np.nan_to_num(np.abs(p.image(points) - image), nan=9).sum())
     )
     turn = reference.rotation[camera].T
-    return np.nan, turn @ best.rotation, turn @ best.shift_mm + reference.centre[camera]
+    return np.nan, turn @ best.rotation, turn @ best.translation_mm + reference.centre[camera]
 
 
 def _placed(epoch: Epoch, found: Floats, place: int) -> _Placed | None:
@@ -130,13 +130,13 @@ def _placed(epoch: Epoch, found: Floats, place: int) -> _Placed | None:
         return None
     weights = np.ones(len(source))
     for _ in range(ROUNDS):
-        scale, rotation, shift = similarity(source, target, scaled=True, weights=weights)
-        off = np.linalg.norm(scale * source @ rotation.T + shift - target, axis=1)
-        weights = 1.0 / np.maximum(off, 0.1 * max(float(np.median(off)), 1e-6))
+        scale, rotation, translation = similarity(source, target, scaled=True, weights=weights)
+        residual = np.linalg.norm(scale * source @ rotation.T + translation - target, axis=1)
+        weights = 1.0 / np.maximum(residual, 0.1 * max(float(np.median(residual)), 1e-6))
     if abs(scale - 1.0) < 0.5:
         # The place is that of the carrier in its known size; the scale is told beside it.
-        _, rotation, shift = similarity(source, target, weights=weights)
-    return scale, rotation, shift
+        _, rotation, translation = similarity(source, target, weights=weights)
+    return scale, rotation, translation
 
 
 def misfit_px(epoch: Epoch, state: State) -> Floats:
@@ -145,13 +145,13 @@ def misfit_px(epoch: Epoch, state: State) -> Floats:
     return np.where(depth > 0.0, np.linalg.norm(epoch.pixel - pixel, axis=1), 1e6)
 
 
-def by_camera(epoch: Epoch, off: Floats, told: Bools | None = None) -> Floats:
+def by_camera(epoch: Epoch, residual: Floats, reported: Bools | None = None) -> Floats:
     """Median misfit (n,) of each camera; 0 for those that saw nothing.
 
     ``told`` (rows,): the image points that count, when not all.
     """
-    counted = np.ones(len(off), bool) if told is None else told
+    counted = np.ones(len(residual), bool) if reported is None else reported
     out = np.zeros(len(epoch.camera_names))
     for k in np.unique(epoch.camera[counted]):
-        out[k] = np.median(off[counted & (epoch.camera == k)])
+        out[k] = np.median(residual[counted & (epoch.camera == k)])
     return out

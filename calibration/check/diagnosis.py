@@ -171,8 +171,8 @@ def _chosen(epoch: Epoch, last: Fit, tests: ScoreTests, outcomes: Outcomes) -> H
 def _size_px(epoch: Epoch, last: Fit, hypothesis: Hypothesis) -> float:
     """Largest shift of an image point by the most likely change."""
     change, _ = estimate(hypothesis, last.linear, last.score)
-    shift = last.linear.design @ (hypothesis.directions(last.linear.columns.count) @ change)
-    return float(np.abs(shift.reshape(-1, 2) * epoch.sigma_px).max())
+    translation = last.linear.design @ (hypothesis.directions(last.linear.columns.count) @ change)
+    return float(np.abs(translation.reshape(-1, 2) * epoch.sigma_px).max())
 
 
 def _by_full_fits(epoch: Epoch, last: Fit, tests: ScoreTests, order: Ints) -> int:
@@ -203,9 +203,9 @@ def _pose_or_lens(epoch: Epoch, last: Fit, tests: ScoreTests, camera: int) -> Hy
 
 def _statistic(causes: list[Hypothesis], last: Fit) -> float:
     """The joint statistic of several causes."""
-    ways = _together(causes, last)
-    inner = ways.T @ last.linear.spread @ ways
-    right = ways.T @ last.score
+    directions = _together(causes, last)
+    inner = directions.T @ last.linear.spread @ directions
+    right = directions.T @ last.score
     scale = np.sqrt(np.maximum(np.diag(inner), 1e-300))
     inverse = np.linalg.pinv(inner / np.outer(scale, scale), rcond=1e-9, hermitian=True)
     return float((right / scale) @ inverse @ (right / scale))

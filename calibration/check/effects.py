@@ -84,16 +84,16 @@ def sensitivity(
     if not (np.diag(own) > 0.0).all():
         return None
     # Shifts are unknowns along the rig's axes, but are told along the camera's.
-    turned = np.eye(6)
-    turned[:3, :3] = found.rotation[camera].T
-    single = DELTA0 / np.sqrt(np.diag(turned.T @ own @ turned))
+    rotated = np.eye(6)
+    rotated[:3, :3] = found.rotation[camera].T
+    single = DELTA0 / np.sqrt(np.diag(rotated.T @ own @ rotated))
     part = slice(INTERIOR, PER_CAMERA)
-    shift, turn = single[:3] * MICROMETRE, single[3:] * URAD
+    translation, turn = single[:3] * MICROMETRE, single[3:] * URAD
     hidden_px = DELTA0 * _largest(found.px[camera, part, part], own)
     hidden_mm = DELTA0 * _largest(found.mm[camera, part, part], own)
     return Sensitivity(
         (float(turn[0]), float(turn[1]), float(turn[2])),
-        (float(shift[0]), float(shift[1]), float(shift[2])),
+        (float(translation[0]), float(translation[1]), float(translation[2])),
         hidden_mm,
         hidden_px,
     )

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calibration.adjustment.finite import finite_rows
+from calibration.adjustment.initialisation.views import Placements
 from calibration.adjustment.result import Calibration
-from calibration.adjustment.start.views import Placements
 from calibration.check.reference import Reference
 from calibration.observations import Observations
 from common.errors import InputError

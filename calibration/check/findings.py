@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from calibration.adjustment.camera import INTERIOR
-from calibration.check import words
+from calibration.check import messages as words
 from calibration.check.diagnosis import Diagnosis
 from calibration.check.effects import Effects
-from calibration.check.gross import Righted
+from calibration.check.gross import Corrected
 from calibration.check.hypotheses import Cause, Hypothesis, log_tail
 from calibration.check.scores import estimate
 from calibration.check.verdicts import Finding, Kind
@@ -62,9 +62,9 @@ def changes(diagnosis: Diagnosis) -> tuple[Change, ...]:
     return tuple(out)
 
 
-def findings(righted: Righted, diagnosis: Diagnosis, found: Effects) -> list[Finding]:
+def findings(corrected: Corrected, diagnosis: Diagnosis, found: Effects) -> list[Finding]:
     """All findings of alarming kinds, gross ones first."""
-    out = _gross(righted, diagnosis)
+    out = _gross(corrected, diagnosis)
     done = changes(diagnosis)
     if diagnosis.nobody_stands:
         out.append(_most_cameras(done, diagnosis))
@@ -82,7 +82,7 @@ def findings(righted: Righted, diagnosis: Diagnosis, found: Effects) -> list[Fin
         elif cause in (Cause.BEND, Cause.SHAPE):
             out.append(_bent(one, diagnosis, found))
         elif cause in (Cause.SCALE, Cause.ALL_SCALE):
-            out.append(_scale(one, diagnosis, righted, found))
+            out.append(_scale(one, diagnosis, corrected, found))
         else:
             sync.append(one)
     for carrier, group in by_carrier.items():
@@ -100,17 +100,17 @@ def _most_cameras(done: tuple[Change, ...], diagnosis: Diagnosis) -> Finding:
     return Finding(Kind.UNEXPLAINED, names, words.most_cameras(names), statistic)
 
 
-def _gross(righted: Righted, diagnosis: Diagnosis) -> list[Finding]:
-    epoch = righted.epoch
+def _gross(corrected: Corrected, diagnosis: Diagnosis) -> list[Finding]:
+    epoch = corrected.epoch
     out = []
-    for cycle in righted.cameras:
+    for cycle in corrected.cameras:
         names = tuple(epoch.camera_names[k] for k in cycle)
         out.append(Finding(Kind.CAMERAS_SWAPPED, names, words.cameras_swapped(names)))
-    if righted.ids:
-        pairs = tuple((epoch.target_names[a], epoch.target_names[b]) for a, b in righted.ids)
+    if corrected.ids:
+        pairs = tuple((epoch.target_names[a], epoch.target_names[b]) for a, b in corrected.ids)
         out.append(Finding(Kind.IDS_SWAPPED, tuple(a for a, _ in pairs), words.ids(pairs)))
     free = {h.cause.subject: h for h in changes(diagnosis) if h.cause.cause is Cause.SCALE}
-    for carrier, scale in righted.scales:
+    for carrier, scale in corrected.scales:
         if carrier not in free:
             out.append(_printed(carrier, scale, 0.0, diagnosis))
     return out
@@ -143,9 +143,9 @@ def _printed(carrier: int, scale: float, more: float, diagnosis: Diagnosis) -> F
     )
 
 
-def _scale(one: Change, diagnosis: Diagnosis, righted: Righted, found: Effects) -> Finding:
+def _scale(one: Change, diagnosis: Diagnosis, corrected: Corrected, found: Effects) -> Finding:
     if one.cause.cause is Cause.SCALE:
-        before = dict(righted.scales).get(one.cause.subject, 1.0)
+        before = dict(corrected.scales).get(one.cause.subject, 1.0)
         return _printed(one.cause.subject, before, float(one.change[0]), diagnosis)
     value, (_, sigma) = float(one.change[0]), scale_estimate(diagnosis, Cause.ALL_SCALE, 0)
     # What a face's width gets wrong by it.
@@ -272,9 +272,11 @@ def _unsynchronised(group: list[Change], diagnosis: Diagnosis) -> Finding:
             cameras |= {int(c) for c in epoch.view_camera[views]}
         if one.cause.cause is not Cause.CAMERA_SYNC:
             frames |= {int(f) for f in epoch.place_frame[epoch.view_place[views]]}
-        shift = diagnosis.last.linear.design @ (one.cause.directions(base.count) @ one.change)
-        shifts = np.linalg.norm(np.asarray(shift).reshape(-1, 2) * epoch.sigma_px, axis=1)
-        largest = max(largest, float(shifts.max()))
+        translation = diagnosis.last.linear.design @ (one.cause.directions(base.count) @ one.change)
+        translations = np.linalg.norm(
+            np.asarray(translation).reshape(-1, 2) * epoch.sigma_px, axis=1
+        )
+        largest = max(largest, float(translations.max()))
     named = tuple(epoch.camera_names[c] for c in sorted(cameras))
     when = tuple(epoch.frame_names[f] for f in sorted(frames))
     worst = max(group, key=lambda one: one.statistic)

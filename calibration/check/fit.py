@@ -90,9 +90,9 @@ def _settled(epoch: Epoch, state: State, unknowns: Floats, model: Linear) -> Fit
 
 
 def _change_px(epoch: Epoch, before: State, after: State) -> float:
-    sight = sight_of(epoch)
-    off = project(after, sight)[0] - project(before, sight)[0]
-    return float(np.sqrt(np.mean(off * off)))
+    observed = sight_of(epoch)
+    residual = project(after, observed)[0] - project(before, observed)[0]
+    return float(np.sqrt(np.mean(residual * residual)))
 
 
 def _with_model(epoch: Epoch, state: State, unknowns: Floats, model: Linear) -> Fit:

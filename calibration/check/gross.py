@@ -28,7 +28,7 @@ NEAR_SHARE = 0.25
 
 
 @dataclass(frozen=True, eq=False)
-class Righted:
+class Corrected:
     """An epoch with gross faults put right, and which they were.
 
     ``suspects``: cameras that are far off although the others agree; ``cameras``: cycles of
@@ -44,7 +44,7 @@ class Righted:
     scales: tuple[tuple[int, float], ...]
 
 
-def put_right(epoch: Epoch) -> Righted:
+def corrected_epoch(epoch: Epoch) -> Corrected:
     """Gross faults found and undone.
 
     Raises :class:`InputError` when the targets are not in the reference's unit.
@@ -65,7 +65,7 @@ def put_right(epoch: Epoch) -> Righted:
         epoch = _relabelled(epoch, ids)
         start = consensus(epoch)
     start, suspects = agreeing(epoch, start)
-    return Righted(epoch, start, suspects, cameras, ids, scales)
+    return Corrected(epoch, start, suspects, cameras, ids, scales)
 
 
 def _assignment(epoch: Epoch, start: Consensus) -> Ints:
@@ -88,12 +88,12 @@ def _assignment(epoch: Epoch, start: Consensus) -> Ints:
 
 def _judged(epoch: Epoch, found: Consensus) -> tuple[float, Bools]:
     """How badly the cameras fit in all, and which do not fit."""
-    off = by_camera(epoch, misfit_px(epoch, found.state))
-    bad = off > BAD_PX
+    residual = by_camera(epoch, misfit_px(epoch, found.state))
+    bad = residual > BAD_PX
     # Swapped cameras spoil each other and may spoil the others: with few cameras try all.
-    if bad.any() and len(off) <= 4:
+    if bad.any() and len(residual) <= 4:
         bad = np.ones_like(bad)
-    return float(np.minimum(off, CAP_PX).sum()), bad
+    return float(np.minimum(residual, CAP_PX).sum()), bad
 
 
 def _cycles(assigned: Ints) -> tuple[tuple[int, ...], ...]:
@@ -162,8 +162,8 @@ def _swapped_ids(epoch: Epoch, found: Consensus) -> tuple[tuple[int, int], ...]:
         apart = np.linalg.norm(nominal[:, None] - nominal[None], axis=2)
         np.fill_diagonal(apart, np.inf)
         spacing = apart.min(axis=1)
-        off = np.linalg.norm(seen - nominal, axis=1)
-        strange = np.flatnonzero(off > NEAR_SHARE * spacing)
+        residual = np.linalg.norm(seen - nominal, axis=1)
+        strange = np.flatnonzero(residual > NEAR_SHARE * spacing)
         if len(strange) < 2 or len(strange) > len(own) // 2 + 1:
             continue
         out += _matched(seen, nominal, spacing, strange, own)

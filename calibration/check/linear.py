@@ -15,8 +15,8 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.sparse import csr_array
 
 from calibration.adjustment.camera import PER_CAMERA
-from calibration.adjustment.model import Sight, partials
-from calibration.adjustment.start.views import spread_rank
+from calibration.adjustment.initialisation.views import spread_rank
+from calibration.adjustment.model import ObservationIndex, partials
 from calibration.adjustment.state import State
 from calibration.check.epoch import Epoch
 from geometry.arrays import Floats, Ints
@@ -66,9 +66,9 @@ GONE = 1e-7
 """A column whose score keeps less than this share of its variance is determined by others."""
 
 
-def sight_of(epoch: Epoch) -> Sight:
+def sight_of(epoch: Epoch) -> ObservationIndex:
     """Each view has a place of its own in the state."""
-    return Sight(epoch.camera, epoch.view, epoch.target)
+    return ObservationIndex(epoch.camera, epoch.view, epoch.target)
 
 
 def moved(state: State, change: Floats, columns: Columns) -> State:

@@ -86,10 +86,13 @@ def _reduced(hypotheses: Sequence[Hypothesis], linear: Linear) -> list[Floats]:
 
 
 def _of_one_shape(hypotheses: Sequence[Hypothesis], linear: Linear) -> list[Floats]:
-    places, ways = np.stack([h.columns for h in hypotheses]), np.stack([h.ways for h in hypotheses])
+    places, directions = (
+        np.stack([h.columns for h in hypotheses]),
+        np.stack([h.ways for h in hypotheses]),
+    )
     square = places[:, :, None], places[:, None, :]
-    own = np.swapaxes(ways, 1, 2) @ linear.spread[square] @ ways
-    full = np.sum(ways * (linear.normal[square] @ ways), axis=1)
+    own = np.swapaxes(directions, 1, 2) @ linear.spread[square] @ directions
+    full = np.sum(directions * (linear.normal[square] @ directions), axis=1)
     diagonal = np.einsum("hdd->hd", own)
     # What others determine has but rounding left: it must not be blown up to a unit.
     kept = diagonal > GONE * full

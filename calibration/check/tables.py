@@ -227,12 +227,12 @@ def length_checks(
         if d.first not in index or d.second not in index:
             continue
         a, b = index[d.first], index[d.second]
-        way = found.found_mm[:, b] - found.found_mm[:, a]
-        length = np.linalg.norm(way, axis=1)
+        direction = found.found_mm[:, b] - found.found_mm[:, a]
+        length = np.linalg.norm(direction, axis=1)
         seen = np.isfinite(length)
         if not seen.any():
             continue
-        unit = way[seen] / length[seen, None]
+        unit = direction[seen] / length[seen, None]
         both = spread[seen][:, a] + spread[seen][:, b]
         variance = np.einsum("pi,pij,pj->p", unit, both, unit).sum() / seen.sum() ** 2
         total = variance + d.sigma_mm**2 + (scale_sigma * d.length_mm) ** 2

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from calibration.detection import opencv
-from calibration.detection.found import Point
+from calibration.detection.detections import Point
 from calibration.detection.gates import Gates, Rejection, Rule
 from calibration.observations import Carrier
 from calibration.targets.kinds import CharucoPlate, TargetPlan

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from calibration.detection import opencv
-from calibration.detection.found import Finding
+from calibration.detection.detections import PictureProblem
 from calibration.detection.gates import Gates
 from calibration.detection.images import Picture
 from calibration.detection.opencv import Markers
 from calibration.detection.plates import LAYOUT_AGREEMENT, agreeing, believable, plane_markers
 from calibration.detection.rings import mirrored_codes, ring_dots
-from calibration.detection.seeing import Sight
+from calibration.detection.seeing import MarkerSearch
 from calibration.targets.kinds import (
     CharucoPlate,
     MarkerCarrier,
@@ -27,8 +27,8 @@ FEW = 8
 
 
 def diagnose(
-    sights: Mapping[bool, Sight], plan: TargetPlan, gates: Gates, found: int
-) -> tuple[Finding, ...]:
+    sights: Mapping[bool, MarkerSearch], plan: TargetPlan, gates: Gates, found: int
+) -> tuple[PictureProblem, ...]:
     """What explains that a plate, or all targets, are missing; empty when nothing does.
 
     ``sights`` are the picture, and its negative for targets with black and white exchanged;
@@ -51,7 +51,7 @@ def diagnose(
     return ()
 
 
-def plate_layout(sight: Sight, plate: CharucoPlate) -> Finding | None:
+def plate_layout(sight: MarkerSearch, plate: CharucoPlate) -> PictureProblem | None:
     """Whether the markers seen lie as on another plate than the one described."""
     markers = sight.markers(plate.dictionary, (plate,))
     own, _ = plane_markers(plate, markers)
@@ -60,7 +60,7 @@ def plate_layout(sight: Sight, plate: CharucoPlate) -> Finding | None:
     return other_layout(plate, markers)
 
 
-def other_layout(plate: CharucoPlate, markers: Markers) -> Finding:
+def other_layout(plate: CharucoPlate, markers: Markers) -> PictureProblem:
     """The plate that fits the markers best, in words."""
     best, share = None, LAYOUT_AGREEMENT
     for columns in sorted(range(3, _MOST_COLUMNS), key=lambda c: c != plate.rows):
@@ -72,25 +72,25 @@ def other_layout(plate: CharucoPlate, markers: Markers) -> Finding:
                 best, share = trial, agreement
     name = plate.name
     if best is None:
-        return Finding(
+        return PictureProblem(
             "other-board",
             f"the markers of plate {name!r} do not lie as on a plate of {plate.columns} columns",
             "check columns, rows and dictionary in the target file against the printed plate",
         )
     if best.columns == plate.columns:
-        return Finding(
+        return PictureProblem(
             "legacy",
             f"plate {name!r} is printed in the {'legacy' if best.legacy else 'present'} pattern",
             f"set legacy = {str(best.legacy).lower()} in the target file",
         )
     if best.columns == plate.rows:
-        return Finding(
+        return PictureProblem(
             "swapped",
             f"plate {name!r} has {plate.rows} columns and {plate.columns} rows, not "
             f"{plate.columns} columns and {plate.rows} rows",
             "exchange columns and rows in the target file",
         )
-    return Finding(
+    return PictureProblem(
         "other-board",
         f"plate {name!r} has {best.columns} columns, not {plate.columns}",
         "correct columns and rows in the target file, or use the right plate",
@@ -119,8 +119,8 @@ def _variant(plate: CharucoPlate, columns: int, legacy: bool) -> CharucoPlate:
 
 
 def _mirrored(
-    sights: Mapping[bool, Sight], plan: TargetPlan, gates: Gates, found: int
-) -> Finding | None:
+    sights: Mapping[bool, MarkerSearch], plan: TargetPlan, gates: Gates, found: int
+) -> PictureProblem | None:
     rings = [c for c in plan.carriers if isinstance(c, RingCarrier)]
     count = 0
     for inverted, sight in sights.items():
@@ -130,7 +130,7 @@ def _mirrored(
         count += mirrored_codes(side, ring_dots(side, gates), mine) if mine else 0
     if count < max(2.0, 0.5 * found):
         return None
-    return Finding(
+    return PictureProblem(
         "mirrored",
         f"the picture is mirrored: {count} targets can be read in a mirror only",
         "switch off mirroring or flipping in the camera or its viewer, and take it again",
@@ -138,13 +138,13 @@ def _mirrored(
 
 
 def _inverted(
-    sights: Mapping[bool, Sight], plan: TargetPlan, gates: Gates, found: int
-) -> Finding | None:
+    sights: Mapping[bool, MarkerSearch], plan: TargetPlan, gates: Gates, found: int
+) -> PictureProblem | None:
     del gates, found
     for inverted, sight in sights.items():
         side = sight.picture.negative
         if _known_markers(side, plan, inverted) >= 2:
-            return Finding(
+            return PictureProblem(
                 "inverted",
                 "the targets are printed with black and white exchanged",
                 f"set inverted = {str(not inverted).lower()} in the target file",
@@ -162,8 +162,8 @@ def _known_markers(picture: Picture, plan: TargetPlan, inverted: bool) -> int:
 
 
 def _other_dictionary(
-    sights: Mapping[bool, Sight], plan: TargetPlan, gates: Gates, found: int
-) -> Finding | None:
+    sights: Mapping[bool, MarkerSearch], plan: TargetPlan, gates: Gates, found: int
+) -> PictureProblem | None:
     del gates, found
     carriers = [c for c in plan.carriers if isinstance(c, CharucoPlate | MarkerCarrier)]
     if not carriers:
@@ -178,7 +178,7 @@ def _other_dictionary(
     name = max(counts, key=lambda n: (counts[n], -opencv.dictionary_size(n)))
     if counts[name] < _ENOUGH_MARKERS:
         return None
-    return Finding(
+    return PictureProblem(
         "dictionary",
         f"the picture shows {counts[name]} markers of {name}, none of {', '.join(mine)}",
         "give the target file of the targets in the picture",

@@ -10,15 +10,15 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from calibration.detection.carriers import carrier_strangers
+from calibration.detection.detections import Detections, PictureProblem, Point
 from calibration.detection.diagnosis import diagnose
-from calibration.detection.found import Detections, Finding, Point
 from calibration.detection.gates import Gates, Rejection, Rule
 from calibration.detection.images import Picture, picture_from, read_picture
 from calibration.detection.markers import marker_points
 from calibration.detection.opencv import AnyImage, Markers
 from calibration.detection.plates import plate_points
 from calibration.detection.rings import ring_dots, ring_points
-from calibration.detection.seeing import Sight
+from calibration.detection.seeing import MarkerSearch
 from calibration.targets.kinds import (
     CarrierKind,
     CharucoPlate,
@@ -48,10 +48,10 @@ def find_targets(
 def _found(picture: Picture, plan: TargetPlan, gates: Gates, explain: bool) -> Detections:
     points: list[Point] = []
     rejections: list[Rejection] = []
-    sights: dict[bool, Sight] = {}
+    sights: dict[bool, MarkerSearch] = {}
     for inverted in sorted({c.inverted for c in plan.carriers}):
         carriers = [c for c in plan.carriers if c.inverted == inverted]
-        sight = Sight(picture.negative if inverted else picture)
+        sight = MarkerSearch(picture.negative if inverted else picture)
         sights[inverted] = sight
         for part in (
             _square_targets(sight, carriers, gates),
@@ -76,7 +76,7 @@ def as_picture(image: Source) -> Picture:
 
 
 def _square_targets(
-    sight: Sight, carriers: Sequence[CarrierKind], gates: Gates
+    sight: MarkerSearch, carriers: Sequence[CarrierKind], gates: Gates
 ) -> tuple[list[Point], list[Rejection]]:
     points: list[Point] = []
     rejections: list[Rejection] = []
@@ -147,7 +147,7 @@ def _detections(
     picture: Picture,
     points: Sequence[Point],
     rejections: Sequence[Rejection],
-    findings: Sequence[Finding],
+    findings: Sequence[PictureProblem],
 ) -> Detections:
     order = {name: k for k, name in enumerate(plan.target_set().ids)}
     points = sorted(points, key=lambda p: order[p.target])

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from calibration.detection import localmap
+from calibration.detection.detections import Point
 from calibration.detection.fitting import Fitted, fit_target, point_of, rejected
-from calibration.detection.found import Point
 from calibration.detection.gates import Gates, Rejection, Rule
 from calibration.detection.images import Picture
 from calibration.detection.opencv import Markers

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
+from calibration.detection.detections import Detections
 from calibration.detection.diagnosis import FEW
 from calibration.detection.finding import find_targets
-from calibration.detection.found import Detections
 from calibration.detection.gates import Gates
 from calibration.detection.images import read_picture
 from calibration.detection.opencv import AnyImage

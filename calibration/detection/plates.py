@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calibration.detection import opencv
-from calibration.detection.found import SIGMA_FLOOR_PX, Point
+from calibration.detection.detections import SIGMA_FLOOR_PX, Point
 from calibration.detection.gates import Gates, Rejection, Rule
 from calibration.detection.images import Picture
 from calibration.detection.opencv import Markers

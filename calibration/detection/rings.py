@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from calibration.detection import localmap
+from calibration.detection.detections import Point
 from calibration.detection.fitting import Fitted, fit_target, point_of, rejected
-from calibration.detection.found import Point
 from calibration.detection.gates import Gates, Rejection, Rule
 from calibration.detection.images import Picture
 from calibration.detection.ringreading import (

@@ -17,7 +17,7 @@ _SURE_SIDE_PX = 26.0
 """Markers of this side in the reduced picture are found there; about half of it is the limit."""
 
 
-class Sight:
+class MarkerSearch:
     """One picture and the markers already looked for in it."""
 
     def __init__(self, picture: Picture) -> None:

@@ -12,7 +12,7 @@ from annotated_types import Len
 
 from calibration.adjustment.camera import CalibratedCamera, Interior
 from calibration.adjustment.noise import NoiseModel
-from calibration.adjustment.result import Calibration, CalibrationQuality, Place
+from calibration.adjustment.result import Calibration, CalibrationQuality, CarrierPose
 from calibration.files.packing import PackedCovariance, compact, packed, unpacked
 from calibration.observations import Carrier, Distance, TargetSet
 from common.errors import InputError
@@ -75,7 +75,7 @@ class TargetsModel(StrictModel):
     distances: list[DistanceModel]
 
 
-class PlaceModel(StrictModel):
+class CarrierPoseModel(StrictModel):
     """Where a carrier stood."""
 
     carrier: str
@@ -98,7 +98,7 @@ class CalibrationModel(StrictModel):
     cameras: list[CameraModel]
     targets: TargetsModel
     target_mm: list[Sparse]
-    places: list[PlaceModel]
+    places: list[CarrierPoseModel]
     covariance: PackedCovariance
     quality: QualityModel
 
@@ -207,7 +207,7 @@ def calibration_from(text: str | bytes, source: str) -> CalibrationRecord:
         targets,
         _dense(model.target_mm, np.nan),
         tuple(
-            Place(
+            CarrierPose(
                 p.carrier,
                 p.frame,
                 np.array(p.position_rig_mm),

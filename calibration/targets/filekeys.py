@@ -21,7 +21,7 @@ class RulerModel(StrictModel):
     sigma_mm: float = 0.1
 
 
-class PlaceModel(StrictModel):
+class TargetPlaceModel(StrictModel):
     """One target; without ``position_mm`` its place is not known."""
 
     number: int
@@ -57,7 +57,7 @@ class MarkersModel(StrictModel):
     inverted: bool = False
     fixed: bool = False
     ruler: RulerModel | None = None
-    targets: Annotated[list[PlaceModel], Field(min_length=1)]
+    targets: Annotated[list[TargetPlaceModel], Field(min_length=1)]
 
 
 class RingsModel(StrictModel):
@@ -73,7 +73,7 @@ class RingsModel(StrictModel):
     fixed: bool = False
     bar: bool = False
     ruler: RulerModel | None = None
-    targets: Annotated[list[PlaceModel], Field(min_length=1)]
+    targets: Annotated[list[TargetPlaceModel], Field(min_length=1)]
 
 
 class DistanceModel(StrictModel):

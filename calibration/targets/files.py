@@ -11,10 +11,10 @@ from pydantic import BaseModel
 from calibration.observations import Distance
 from calibration.targets.filekeys import (
     MarkersModel,
-    PlaceModel,
     PlateModel,
     RingsModel,
     RulerModel,
+    TargetPlaceModel,
     TargetsModel,
 )
 from calibration.targets.kinds import (
@@ -22,9 +22,9 @@ from calibration.targets.kinds import (
     CarrierKind,
     CharucoPlate,
     MarkerCarrier,
-    Place,
     RingCarrier,
     Ruler,
+    TargetPlace,
     TargetPlan,
     marker_numbers,
 )
@@ -153,13 +153,13 @@ def _ruler(model: RulerModel | None) -> Ruler | None:
     return None if model is None else Ruler(**model.model_dump())
 
 
-def _places(models: list[PlaceModel]) -> tuple[Place, ...]:
+def _places(models: list[TargetPlaceModel]) -> tuple[TargetPlace, ...]:
     out = []
     for m in models:
         if m.position_mm is None:
-            out.append(Place(m.number, UNKNOWN_MM))
+            out.append(TargetPlace(m.number, UNKNOWN_MM))
         else:
-            out.append(Place(m.number, m.position_mm, m.sigma_mm or PLACE_SIGMA_MM))
+            out.append(TargetPlace(m.number, m.position_mm, m.sigma_mm or PLACE_SIGMA_MM))
     return tuple(out)
 
 
@@ -192,7 +192,7 @@ def _model(carrier: CarrierKind) -> tuple[str, BaseModel]:
     return "rings", RingsModel(code_distance=family.distance, **values)
 
 
-def _place(place: Place) -> dict[str, Any]:
+def _place(place: TargetPlace) -> dict[str, Any]:
     if not all(map(math.isfinite, place.position_mm)):
         return {"number": place.number}
     return {

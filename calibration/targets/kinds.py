@@ -145,7 +145,7 @@ class CharucoPlate:
 
 
 @dataclass(frozen=True)
-class Place:
+class TargetPlace:
     """One target of a carrier: its number and where it is (NaN: not known).
 
     ``sigma_mm`` is 0 for exact, infinite for not known at all.
@@ -169,7 +169,7 @@ class MarkerCarrier:
     name: str
     dictionary: str
     size_mm: float
-    places: tuple[Place, ...]
+    places: tuple[TargetPlace, ...]
     dot: bool = False
     corners: bool = False
     inverted: bool = False
@@ -223,7 +223,7 @@ class RingCarrier:
 
     name: str
     dot_radius_mm: float
-    places: tuple[Place, ...]
+    places: tuple[TargetPlace, ...]
     family: RingCodeFamily = field(default_factory=RingCodeFamily)
     inverted: bool = False
     fixed: bool = False
@@ -270,7 +270,7 @@ class RingCarrier:
 CarrierKind = CharucoPlate | MarkerCarrier | RingCarrier
 
 
-def _check_places(name: str, places: tuple[Place, ...]) -> None:
+def _check_places(name: str, places: tuple[TargetPlace, ...]) -> None:
     numbers = [p.number for p in places]
     _require(
         len(numbers) > 0 and len(set(numbers)) == len(numbers) and min(numbers) >= 0,
@@ -280,7 +280,7 @@ def _check_places(name: str, places: tuple[Place, ...]) -> None:
     )
 
 
-def _nominal(places: tuple[Place, ...], scale: float) -> tuple[Floats, Floats]:
+def _nominal(places: tuple[TargetPlace, ...], scale: float) -> tuple[Floats, Floats]:
     return np.array([p.position_mm for p in places]) * scale, np.array([p.sigma_mm for p in places])
 
 

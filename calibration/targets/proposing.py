@@ -12,8 +12,8 @@ from calibration.targets.kinds import (
     RING_QUIET,
     CarrierKind,
     CharucoPlate,
-    Place,
     RingCarrier,
+    TargetPlace,
     TargetPlan,
 )
 from calibration.targets.ringcodes import RingCodeFamily
@@ -236,7 +236,7 @@ def _plan(
     carriers: list[CarrierKind] = [*plate]
     if len(places):
         spots = tuple(
-            Place(k, (float(p[0]), float(p[1]), float(p[2]))) for k, p in enumerate(places, 1)
+            TargetPlace(k, (float(p[0]), float(p[1]), float(p[2]))) for k, p in enumerate(places, 1)
         )
         carriers.append(RingCarrier("stand", radius_mm, spots, RingCodeFamily(bits), fixed=True))
     length = float(np.floor(np.sort(size)[-2:].mean() / 10.0) * 10.0)

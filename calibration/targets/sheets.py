@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from calibration.observations import Distance
-from calibration.targets.kinds import RING_QUIET, MarkerCarrier, Place, RingCarrier
+from calibration.targets.kinds import RING_QUIET, MarkerCarrier, RingCarrier, TargetPlace
 from calibration.targets.ringcodes import RingCodeFamily
 from common.errors import InputError
 
@@ -61,7 +61,8 @@ def scale_bar(
         )
     sigma = (sigma_mm, 0.1, 0.1)
     spots = tuple(
-        Place(n, (x, 0.0, 0.0), sigma) for n, x in zip(numbers, (0.0, *lengths_mm), strict=True)
+        TargetPlace(n, (x, 0.0, 0.0), sigma)
+        for n, x in zip(numbers, (0.0, *lengths_mm), strict=True)
     )
     bar = RingCarrier(name, dot_radius_mm, spots, RingCodeFamily(bits), bar=True)
     distances = tuple(
@@ -70,10 +71,10 @@ def scale_bar(
     return bar, distances
 
 
-def _rows(numbers: Sequence[int], columns: int, step_mm: float) -> tuple[Place, ...]:
+def _rows(numbers: Sequence[int], columns: int, step_mm: float) -> tuple[TargetPlace, ...]:
     if columns < 1:
         raise InputError("sheet", f"a sheet cannot have {columns} columns", "give 1 or more")
     return tuple(
-        Place(n, (k % columns * step_mm, k // columns * step_mm, 0.0), PRINT_SIGMA_MM)
+        TargetPlace(n, (k % columns * step_mm, k // columns * step_mm, 0.0), PRINT_SIGMA_MM)
         for k, n in enumerate(numbers)
     )

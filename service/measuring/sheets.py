@@ -15,8 +15,8 @@ from calibration.targets.kinds import (
     CarrierKind,
     CharucoPlate,
     MarkerCarrier,
-    Place,
     RingCarrier,
+    TargetPlace,
     TargetPlan,
 )
 from calibration.targets.printing import carrier_drawings, to_pdf, to_svg
@@ -80,7 +80,7 @@ def _laid_out(carrier: CarrierKind) -> CarrierKind:
     """A stand's targets one beside the other: they are cut out and put up at their places."""
     if isinstance(carrier, CharucoPlate) or not _stands(carrier):
         return carrier
-    return replace(carrier, places=tuple(Place(place.number) for place in carrier.places))
+    return replace(carrier, places=tuple(TargetPlace(place.number) for place in carrier.places))
 
 
 def _stands(carrier: MarkerCarrier | RingCarrier) -> bool:

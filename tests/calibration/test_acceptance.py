@@ -11,7 +11,7 @@ from synthetic_scenes import Scene
 
 from calibration.acceptance import LengthLimit, Outcome, Volume, accept, certificate_pdf
 from calibration.acceptance.certificate import Heading
-from calibration.adjustment.start.resection import Placed
+from calibration.adjustment.initialisation.resection import RigidTransform
 from calibration.observations import Carrier, TargetSet
 from common.errors import InputError
 from geometry.arrays import Floats
@@ -30,7 +30,8 @@ def bar_scene(lines: int = 7, scale: float = 1.0, targets: int = 6) -> Scene:
         "bar", tuple(f"b{k}" for k in range(targets)), nominal, np.full((targets, 3), 1e-3)
     )
     places = [
-        Placed(axes(way), 15.0 * np.sin(np.arange(3) + k)) for k, way in enumerate(WAYS[:lines])
+        RigidTransform(axes(way), 15.0 * np.sin(np.arange(3) + k))
+        for k, way in enumerate(WAYS[:lines])
     ]
     return Scene(
         calibrations.small_scene().cameras,

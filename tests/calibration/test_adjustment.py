@@ -19,10 +19,10 @@ from calibration.adjustment import (
 from calibration.adjustment.build import Start
 from calibration.adjustment.camera import PER_CAMERA
 from calibration.adjustment.datum import inner_constraints
+from calibration.adjustment.initialisation.finding import find_start
 from calibration.adjustment.levenberg import Solution, Stop, adjust
 from calibration.adjustment.network import Network
 from calibration.adjustment.reliability import DELTA0, reliability
-from calibration.adjustment.start.finding import find_start
 from calibration.adjustment.state import State
 from calibration.observations import Observations
 from common.errors import CancelledError
@@ -171,7 +171,9 @@ def test_a_blunder_is_found_named_and_left_out() -> None:
 
 def test_a_view_taken_at_another_moment_is_left_out_whole_and_named() -> None:
     place = SCENE.places[1][2]
-    late = {(3, 2): replace(place, shift_mm=place.shift_mm + np.array([0.4, 0.2, -0.3]))}
+    late = {
+        (3, 2): replace(place, translation_mm=place.translation_mm + np.array([0.4, 0.2, -0.3]))
+    }
     observations = replace(SCENE, seen_otherwise=late).observe(0.1, 12)
     found = calibrate(observations, CalibrationOptions(start=SCENE.cameras, cross_validate=False))
     assert [(v.camera, v.frame) for v in found.quality.late_views] == [("cam4", "frame3")]

@@ -12,11 +12,11 @@ from scipy.spatial.transform import Rotation
 from synthetic_scenes import Scene, face_rig, stand
 
 from calibration.adjustment.camera import CalibratedCamera, Interior
+from calibration.adjustment.initialisation.finding import find_start
+from calibration.adjustment.initialisation.resection import RigidTransform
 from calibration.adjustment.levenberg import LossOptions, Solution, adjust
 from calibration.adjustment.network import Network
 from calibration.adjustment.options import FREE, CalibrationOptions, InteriorModel
-from calibration.adjustment.start.finding import find_start
-from calibration.adjustment.start.resection import Placed
 from calibration.observations import TargetSet
 from geometry.arrays import Floats
 
@@ -36,7 +36,7 @@ def scene() -> Scene:
             replace(camera, interior=Interior(i.focal_length_px, i.principal_point_px, terms))
         )
     carrier, points = stand(16, 7, TARGET_SIGMA_MM)
-    places = ((Placed(np.eye(3), np.zeros(3)),),)
+    places = ((RigidTransform(np.eye(3), np.zeros(3)),),)
     return Scene(tuple(cameras), TargetSet("stand", (carrier,)), points, places)
 
 
@@ -100,7 +100,9 @@ def test_ceres_finds_the_same_with_the_same_sigmas() -> None:
         interiors.append(np.array([i.focal_length_px, *half, *i.distortion[:2]]))
     points = [p.copy() for p in network.priors.target]
     model, noise = pycolmap.CameraModelId.RADIAL, SIGMA_PX**2 * np.eye(2)
-    for c, t, pixel in zip(network.sight.camera, network.sight.target, network.pixel, strict=True):
+    for c, t, pixel in zip(
+        network.observed.camera, network.observed.target, network.pixel, strict=True
+    ):
         cost = costs.ReprojErrorCost(model, noise, pixel + 0.5)
         problem.add_residual_block(cost, None, [points[t], poses[c], interiors[c]])
     for k, point in enumerate(points):
@@ -153,7 +155,7 @@ def test_dense_numeric_least_squares_finds_the_same() -> None:
         parts = []
         for k, camera in enumerate(given):
             rows = slice(network.camera_rows[k], network.camera_rows[k + 1])
-            image = project(camera, cameras[k], points[network.sight.target[rows]])
+            image = project(camera, cameras[k], points[network.observed.target[rows]])
             parts.append(((network.pixel[rows] - image) / SIGMA_PX).ravel())
         parts.append(((points - network.priors.target) / TARGET_SIGMA_MM).ravel())
         return np.concatenate(parts)

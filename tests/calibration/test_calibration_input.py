@@ -11,7 +11,7 @@ import pytest
 from synthetic_scenes import Scene, face_rig, plate, plate_places, stand
 
 from calibration.adjustment import CalibrationOptions, InteriorModel, ReferencePoses, calibrate
-from calibration.adjustment.start.resection import Placed
+from calibration.adjustment.initialisation.resection import RigidTransform
 from calibration.observations import Carrier, Distance, Observations, TargetSet
 from common.errors import InputError
 from geometry.frames import Pose
@@ -83,7 +83,9 @@ def frontal_plates() -> Observations:
         for c, x in zip(face_rig(2), (-20.0, 20.0), strict=True)
     )
     turn = cameras[0].pose.rotation_rig_to_camera.T
-    places = tuple(Placed(turn, dx * turn[:, 0] - 2.0 * dx * turn[:, 1]) for dx in (-9.0, 0.0, 9.0))
+    places = tuple(
+        RigidTransform(turn, dx * turn[:, 0] - 2.0 * dx * turn[:, 1]) for dx in (-9.0, 0.0, 9.0)
+    )
     return Scene(cameras, TargetSet("p", (carrier,)), points, (places,)).observe(0.1, 2)
 
 
@@ -96,7 +98,7 @@ def nothing_in_common() -> Observations:
 
 def no_size() -> Observations:
     carrier, points = stand(40)
-    places = ((Placed(np.eye(3), np.zeros(3)),),)
+    places = ((RigidTransform(np.eye(3), np.zeros(3)),),)
     return Scene(face_rig(3), TargetSet("r", (carrier,)), points, places).observe(0.1, 1)
 
 

@@ -12,11 +12,11 @@ from synthetic_scenes import Scene, face_rig, face_scene, plate_places
 
 from benchmarks.trials import Bench
 from calibration.adjustment import CalibrationOptions, calibrate
+from calibration.adjustment.initialisation.resection import RigidTransform
 from calibration.adjustment.rotations import rotation_of
-from calibration.adjustment.start.resection import Placed
 from calibration.check import CheckOptions, CheckResult, Kind, Light, check
 from calibration.check.diagnosis import diagnose
-from calibration.check.gross import put_right
+from calibration.check.gross import corrected_epoch
 from calibration.check.hypotheses import Cause
 from calibration.observations import Carrier, TargetSet
 from common.errors import CancelledError, InputError
@@ -178,9 +178,9 @@ def test_swapped_cameras() -> None:
 def test_a_late_camera_is_a_fault_of_the_trigger(size_mm: float) -> None:
     rng = np.random.default_rng(2)
     seen = {
-        (2, f): Placed(
+        (2, f): RigidTransform(
             rotation_of(5e-3 * size_mm * rng.normal(size=3)) @ p.rotation,
-            p.shift_mm + size_mm * way,
+            p.translation_mm + size_mm * way,
         )
         for f, p in enumerate(SCENE.places[1])
         for way in [rng.normal(size=3)]
@@ -193,7 +193,8 @@ def test_one_frame_that_is_torn() -> None:
     rng = np.random.default_rng(3)
     place = SCENE.places[1][1]
     seen = {
-        (c, 1): Placed(place.rotation, place.shift_mm + 0.3 * rng.normal(size=3)) for c in range(5)
+        (c, 1): RigidTransform(place.rotation, place.translation_mm + 0.3 * rng.normal(size=3))
+        for c in range(5)
     }
     result = checked(replace(SCENE, seen_otherwise=seen))
     assert result.kinds == (Kind.UNSYNCHRONISED,)
@@ -288,7 +289,7 @@ def test_statistics_of_an_unchanged_rig_are_chi_square_reference_error_included(
         rng = np.random.default_rng(seed)
         drawn = bench.epoch.reference.drawn(rng)
         epoch = bench.epoch.with_pixels(exact + 0.1 * rng.normal(size=exact.shape), drawn)
-        found = diagnose(epoch, put_right(epoch).start.state, (), bench.prepared)
+        found = diagnose(epoch, corrected_epoch(epoch).start.state, (), bench.prepared)
         values.append(found.outcomes.statistic[poses[seed % len(poses)]])
     assert kstest(values, "chi2", args=(6,)).pvalue > 1e-3
     # The mean of 80 scatters by sqrt(12 / 80) = 0.39; three of those. Without the reference's own

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from calibration.adjustment.camera import INTERIOR, PER_CAMERA, CalibratedCamera, Interior
-from calibration.adjustment.model import Sight, partials, project
+from calibration.adjustment.model import ObservationIndex, partials, project
 from calibration.adjustment.rotations import rotation_of, similarity, vector_of
 from calibration.adjustment.state import State
 from geometry.arrays import Floats
@@ -33,7 +33,7 @@ def state(seed: int, terms: float = 1.0) -> State:
     )
 
 
-SIGHT = Sight(
+SIGHT = ObservationIndex(
     np.repeat([0, 1], 10).astype(np.int64),
     np.tile(np.repeat([0, 1], 5), 2).astype(np.int64),
     np.tile(np.arange(5), 4).astype(np.int64),

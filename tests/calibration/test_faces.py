@@ -12,8 +12,8 @@ from calibration.targets.kinds import (
     CarrierKind,
     CharucoPlate,
     MarkerCarrier,
-    Place,
     RingCarrier,
+    TargetPlace,
     TargetPlan,
 )
 from common.errors import InputError
@@ -22,8 +22,8 @@ GRID = [(x, y, 0.0) for y in (0.0, 40.0) for x in (0.0, 45.0, 90.0)]
 EXACT = (0.0, 0.0, 0.0)
 
 
-def places(numbers: list[int]) -> tuple[Place, ...]:
-    return tuple(Place(n, p, EXACT) for n, p in zip(numbers, GRID, strict=True))
+def places(numbers: list[int]) -> tuple[TargetPlace, ...]:
+    return tuple(TargetPlace(n, p, EXACT) for n, p in zip(numbers, GRID, strict=True))
 
 
 @pytest.mark.parametrize(
@@ -52,7 +52,7 @@ def test_targets_are_found_on_a_face_where_they_are_printed(kind: CarrierKind) -
 
 
 def test_what_has_no_face_is_refused() -> None:
-    far = (Place(1, (0.0, 0.0, 0.0), EXACT), Place(2, (0.0, 0.0, 50.0), EXACT))
+    far = (TargetPlace(1, (0.0, 0.0, 0.0), EXACT), TargetPlace(2, (0.0, 0.0, 50.0), EXACT))
     with pytest.raises(InputError, match="is not flat"):
         carrier_face(RingCarrier("stand", 3.0, far))
 

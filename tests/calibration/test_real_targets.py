@@ -15,7 +15,7 @@ from calibration.detection.gates import Gates
 from calibration.detection.images import read_picture
 from calibration.detection.markers import marker_points
 from calibration.detection.opencv import Markers
-from calibration.targets.kinds import CharucoPlate, MarkerCarrier, Place, TargetPlan
+from calibration.targets.kinds import CharucoPlate, MarkerCarrier, TargetPlace, TargetPlan
 from geometry.arrays import Floats
 
 pytestmark = pytest.mark.slow
@@ -40,7 +40,7 @@ def test_corners_of_april_tags_lie_where_they_are_listed() -> None:
     for path in sorted(folder("apriltag").glob("*.jpg")):
         picture, truth = read_picture(path), listed(path.with_suffix(".txt"))
         markers = opencv.detect_markers(picture.grey, "DICT_APRILTAG_36H11")
-        tags = MarkerCarrier("tags", "DICT_APRILTAG_36H11", 100.0, (Place(0),), corners=True)
+        tags = MarkerCarrier("tags", "DICT_APRILTAG_36H11", 100.0, (TargetPlace(0),), corners=True)
         # All tags show number 0, so one is taken at a time.
         for corners in markers.corners_px:
             points, _ = marker_points(
@@ -89,7 +89,7 @@ def test_markers_in_the_webcam_frames_are_found() -> None:
         numbers = sorted(set(markers.ids.tolist()))
         if not numbers:
             continue
-        places = tuple(Place(number) for number in numbers)
+        places = tuple(TargetPlace(number) for number in numbers)
         carrier = MarkerCarrier("markers", "DICT_4X4_100", 100.0, places)
         found = find_targets(picture, TargetPlan("set", (carrier,)), explain=False)
         own, plain = own + len(found), plain + len(numbers)

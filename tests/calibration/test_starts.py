@@ -10,7 +10,7 @@ import pytest
 from synthetic_scenes import Scene, face_rig, plate, plate_places, stand, turned
 
 from calibration.adjustment import Calibration, CalibrationOptions, calibrate
-from calibration.adjustment.start.resection import Placed
+from calibration.adjustment.initialisation.resection import RigidTransform
 from calibration.observations import Carrier, Distance, TargetSet
 
 SCENE = calibrations.small_scene()
@@ -60,7 +60,7 @@ def test_unknown_targets_need_focal_lengths_and_a_scale_only() -> None:
     )
     length = float(np.linalg.norm(points[0] - points[1]))
     distances = (Distance("ring1", "ring2", length, 0.01),)
-    places = ((Placed(np.eye(3), np.zeros(3)),),)
+    places = ((RigidTransform(np.eye(3), np.zeros(3)),),)
     scene = Scene(face_rig(4), TargetSet("rings", (unknown,), distances), points, places)
     # A data sheet's values: f to 1 %, centre and distortion unknown.
     interiors = {
@@ -90,7 +90,7 @@ def wand_scene(frames: int) -> Scene:
         turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
         turn *= np.sign(np.linalg.det(turn))
         middle = rng.uniform(-60.0, 60.0, 3)
-        places.append(Placed(turn, middle - turn @ [100.0, 0.0, 0.0]))
+        places.append(RigidTransform(turn, middle - turn @ [100.0, 0.0, 0.0]))
     # A wand is seen from all sides.
     return Scene(
         face_rig(3), TargetSet("wand", (bar,)), nominal, (tuple(places),), widest_deg=180.0

@@ -13,9 +13,9 @@ from calibration.targets.files import read_targets, targets_from, targets_text, 
 from calibration.targets.kinds import (
     CharucoPlate,
     MarkerCarrier,
-    Place,
     RingCarrier,
     Ruler,
+    TargetPlace,
     TargetPlan,
 )
 from calibration.targets.ringcodes import RingCodeFamily
@@ -25,7 +25,7 @@ from common.errors import ConflictError, InputError
 lengths = st.floats(-500.0, 500.0)
 sigmas = st.one_of(st.floats(0.0, 10.0), st.just(float("inf")))
 known = st.builds(
-    Place, st.just(1), st.tuples(lengths, lengths, lengths), st.tuples(sigmas, sigmas, sigmas)
+    TargetPlace, st.just(1), st.tuples(lengths, lengths, lengths), st.tuples(sigmas, sigmas, sigmas)
 )
 names = st.text(st.characters(codec="utf-8", exclude_categories=("C",)), min_size=1, max_size=12)
 rulers = st.one_of(st.none(), st.builds(Ruler, st.just(100.0), st.floats(90.0, 110.0)))
@@ -33,7 +33,9 @@ rulers = st.one_of(st.none(), st.builds(Ruler, st.just(100.0), st.floats(90.0, 1
 
 @settings(max_examples=12, deadline=None)
 @given(names, known, rulers, st.booleans())
-def test_what_is_written_is_read(name: str, place: Place, ruler: Ruler | None, flag: bool) -> None:
+def test_what_is_written_is_read(
+    name: str, place: TargetPlace, ruler: Ruler | None, flag: bool
+) -> None:
     bar, distances = scale_bar("bar", (40, 41), (200.0,), 3.0)
     plan = TargetPlan(
         name,

@@ -12,8 +12,8 @@ from calibration.targets.kinds import (
     CarrierKind,
     CharucoPlate,
     MarkerCarrier,
-    Place,
     RingCarrier,
+    TargetPlace,
     TargetPlan,
 )
 from calibration.targets.printing import carrier_drawings, page_size, to_pdf, to_svg
@@ -105,7 +105,7 @@ def test_svg_and_pdf_are_drawn_alike() -> None:
 
 
 def test_targets_without_places_fill_as_many_pages_as_they_need() -> None:
-    kind = RingCarrier("stand", 14.0, tuple(Place(n) for n in range(1, 6)))
+    kind = RingCarrier("stand", 14.0, tuple(TargetPlace(n) for n in range(1, 6)))
     assert len(carrier_drawings(kind, "A4")) == 3
     seen: set[str] = set()
     for image in pages(kind, "A4", 25):
@@ -122,7 +122,10 @@ def test_sheets_that_cannot_be_are_refused() -> None:
         with pytest.raises(InputError, match="there is no page"):
             page_size(page)
     solid = MarkerCarrier(
-        "cube", "DICT_4X4_50", 20.0, (Place(1, (0.0, 0.0, 0.0)), Place(2, (0.0, 0.0, 50.0)))
+        "cube",
+        "DICT_4X4_50",
+        20.0,
+        (TargetPlace(1, (0.0, 0.0, 0.0)), TargetPlace(2, (0.0, 0.0, 50.0))),
     )
     with pytest.raises(InputError, match="is not flat"):
         carrier_drawings(solid)

@@ -18,7 +18,7 @@ from service_helpers import InThisProcess, files_under, rigwright, rigwright_her
 from starlette.testclient import TestClient
 
 from calibration.targets.files import targets_text
-from calibration.targets.kinds import Place, RingCarrier, TargetPlan
+from calibration.targets.kinds import RingCarrier, TargetPlace, TargetPlan
 from geometry.arrays import Floats
 from rig.design.designfile import placed_camera
 from service.api.app import create_app
@@ -165,7 +165,7 @@ VOLUME = ("--volume", 300, 180, 100)
 
 def bar(scale: float = 1.0) -> RingCarrier:
     places = tuple(
-        Place(k + 1, (float(x * scale), 0.0, 0.0), (0.005, 0.005, 0.005))
+        TargetPlace(k + 1, (float(x * scale), 0.0, 0.0), (0.005, 0.005, 0.005))
         for k, x in enumerate(BAR_MM)
     )
     return RingCarrier("bar", 6.0, places, bar=True)

@@ -36,9 +36,9 @@ def check_scene() -> Scene:
 
 
 def disturbed(
-    scene: Scene, camera: int, shift_mm: Floats = STILL, turn_rad: Floats = STILL
+    scene: Scene, camera: int, translation_mm: Floats = STILL, turn_rad: Floats = STILL
 ) -> Scene:
     """The scene with one camera moved."""
     cameras = list(scene.cameras)
-    cameras[camera] = turned(cameras[camera], np.asarray(shift_mm), np.asarray(turn_rad))
+    cameras[camera] = turned(cameras[camera], np.asarray(translation_mm), np.asarray(turn_rad))
     return scene.with_cameras(tuple(cameras))

@@ -12,8 +12,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from calibration.adjustment.camera import CalibratedCamera, Interior
+from calibration.adjustment.initialisation.resection import RigidTransform
 from calibration.adjustment.rotations import rotation_of
-from calibration.adjustment.start.resection import Placed
 from calibration.observations import Carrier, Distance, Observations, TargetSet
 from geometry.arrays import Bools, Floats, Ints
 from geometry.frames import Pose
@@ -88,7 +88,7 @@ def bars(
     return tuple(out)
 
 
-def plate_places(count: int, seed: int = 6) -> tuple[Placed, ...]:
+def plate_places(count: int, seed: int = 6) -> tuple[RigidTransform, ...]:
     """Places of a plate in the volume, facing the cameras and tilted to 40 degrees."""
     rng = np.random.default_rng(seed)
     out = []
@@ -97,7 +97,7 @@ def plate_places(count: int, seed: int = 6) -> tuple[Placed, ...]:
         # The plate's z away from the cameras: its printed side faces them.
         facing = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
         shift = rng.uniform(-0.25, 0.25, 3) * VOLUME_MM
-        out.append(Placed(tilt @ facing, shift))
+        out.append(RigidTransform(tilt @ facing, shift))
     return tuple(out)
 
 
@@ -114,8 +114,8 @@ class Scene:
     cameras: tuple[CalibratedCamera, ...]
     targets: TargetSet
     true_mm: Floats
-    places: tuple[tuple[Placed, ...], ...]
-    seen_otherwise: Mapping[tuple[int, int], Placed] = field(default_factory=dict)
+    places: tuple[tuple[RigidTransform, ...], ...]
+    seen_otherwise: Mapping[tuple[int, int], RigidTransform] = field(default_factory=dict)
     widest_deg: float = 65.0
 
     @property
@@ -130,7 +130,7 @@ class Scene:
         place = self.places[carrier][0 if fixed else frame]
         if not fixed:
             place = self.seen_otherwise.get((camera, frame), place)
-        return np.asarray(own @ place.rotation.T + place.shift_mm)
+        return np.asarray(own @ place.rotation.T + place.translation_mm)
 
     def observe(self, sigma_px: float, seed: int | np.random.Generator) -> Observations:
         """Image points of all targets that are in frame and face the camera."""
@@ -176,7 +176,7 @@ class Scene:
         if self.targets.carriers[carrier].fixed:
             return True
         place = self.places[carrier][frame]
-        away = place.shift_mm - self.cameras[camera].pose.position_rig_mm
+        away = place.translation_mm - self.cameras[camera].pose.position_rig_mm
         cosine = float(place.rotation[:, 2] @ away / np.linalg.norm(away))
         return cosine >= float(np.cos(np.radians(self.widest_deg)))
 
@@ -204,14 +204,14 @@ def face_scene(
     moving, moving_points = plate(seed=seed + 1)
     distances = bars(still, still_points, seed=seed + 2)
     targets = TargetSet("face", (still, moving), distances)
-    nowhere = (Placed(np.eye(3), np.zeros(3)),)
+    nowhere = (RigidTransform(np.eye(3), np.zeros(3)),)
     places = (nowhere, plate_places(frames, seed + 3))
     return Scene(rig, targets, np.concatenate([still_points, moving_points]), places)
 
 
-def turned(camera: CalibratedCamera, shift_mm: Floats, turn_rad: Floats) -> CalibratedCamera:
-    """A camera moved by ``shift_mm`` along and turned by ``turn_rad`` about its own axes."""
+def turned(camera: CalibratedCamera, translation_mm: Floats, turn_rad: Floats) -> CalibratedCamera:
+    """A camera moved by ``translation_mm`` along and turned by ``turn_rad`` about its own axes."""
     pose = camera.pose
     rotation = rotation_of(np.asarray(turn_rad, np.float64)) @ pose.rotation_rig_to_camera
-    position = pose.position_rig_mm + np.asarray(shift_mm) @ pose.rotation_rig_to_camera
+    position = pose.position_rig_mm + np.asarray(translation_mm) @ pose.rotation_rig_to_camera
     return replace(camera, pose=Pose(position, rotation))

@@ -8,8 +8,14 @@ import numpy as np
 from held_patterns import placed_carrier, true_pixels
 from scipy.spatial.transform import Rotation
 
-from calibration.detection.found import Detections
-from calibration.targets.kinds import CarrierKind, CharucoPlate, MarkerCarrier, Place, RingCarrier
+from calibration.detection.detections import Detections
+from calibration.targets.kinds import (
+    CarrierKind,
+    CharucoPlate,
+    MarkerCarrier,
+    RingCarrier,
+    TargetPlace,
+)
 from calibration.targets.rendering import photographed, render
 from calibration.targets.ringcodes import RingCodeFamily
 from geometry.arrays import Floats
@@ -31,9 +37,9 @@ def rotation(tilt_deg: float = 0.0, pan_deg: float = 0.0, roll_deg: float = 0.0)
     return np.asarray(Rotation.from_euler("zyx", angles, degrees=True).as_matrix())
 
 
-def places(numbers: Sequence[int], columns: int, step_mm: float) -> tuple[Place, ...]:
+def places(numbers: Sequence[int], columns: int, step_mm: float) -> tuple[TargetPlace, ...]:
     return tuple(
-        Place(n, (k % columns * step_mm, k // columns * step_mm, 0.0), EXACT)
+        TargetPlace(n, (k % columns * step_mm, k // columns * step_mm, 0.0), EXACT)
         for k, n in enumerate(numbers)
     )
 

@@ -7,8 +7,8 @@ from scipy.linalg import rq
 
 from calibration.adjustment.camera import Interior
 from calibration.adjustment.finite import finite_rows
-from calibration.adjustment.start.resection import interior_from_planes
-from calibration.adjustment.start.views import View, is_planar
+from calibration.adjustment.initialisation.resection import interior_from_planes
+from calibration.adjustment.initialisation.views import View, is_planar
 from calibration.observations import Observations
 from common.errors import InputError
 from geometry.arrays import Floats

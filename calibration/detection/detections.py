@@ -14,7 +14,7 @@ but lenses, paper and sensors are not even to much better than that."""
 
 
 @dataclass(frozen=True)
-class Finding:
+class PictureProblem:
     """Something about the whole picture that explains why targets are missing.
 
     ``code`` is a stable slug: mirrored, legacy, swapped, other-board, inverted, dictionary.
@@ -43,7 +43,7 @@ class Detections:
     sigma_px: Floats
     blur_px: Floats
     rejections: tuple[Rejection, ...] = ()
-    findings: tuple[Finding, ...] = ()
+    findings: tuple[PictureProblem, ...] = ()
 
     def __post_init__(self) -> None:
         for name in ("pixel", "sigma_px", "blur_px"):

@@ -8,27 +8,25 @@ from typing import Any
 import numpy as np
 
 from calibration.adjustment.camera import Interior
+from calibration.adjustment.initialisation.views import is_planar
 from calibration.adjustment.rotations import rotation_of
-from calibration.adjustment.start.views import is_planar
 from geometry.arrays import Bools, Floats
-from geometry.camera import NO_DISTORTION
+from geometry.camera import NO_DISTORTION, perspective
 
 MAX_VIEWS = 15
 """Plates beyond this many add nothing to a start but time."""
 
 
 @dataclass(frozen=True, eq=False)
-class Placed:
-    """A carrier in a camera's frame, ``x_camera = rotation x + shift_mm``."""
+class RigidTransform:
+    """A carrier in a camera's frame, ``x_camera = rotation x + translation_mm``."""
 
     rotation: Floats
-    shift_mm: Floats
+    translation_mm: Floats
 
     def image(self, points_mm: Floats) -> Floats:
         """Normalised coordinates (n, 2) of points (n, 3); NaN behind the camera."""
-        local = points_mm @ self.rotation.T + self.shift_mm
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return np.where(local[:, 2:] > 0.0, local[:, :2] / local[:, 2:], np.nan)
+        return perspective(points_mm @ self.rotation.T + self.translation_mm)
 
 
 def _cv2() -> Any:  # noqa: ANN401 - OpenCV has no types worth the name
@@ -38,7 +36,7 @@ def _cv2() -> Any:  # noqa: ANN401 - OpenCV has no types worth the name
     return cv2
 
 
-def placed_candidates(points_mm: Floats, normalised: Floats) -> list[Placed]:
+def placed_candidates(points_mm: Floats, normalised: Floats) -> list[RigidTransform]:
     """Where a carrier may stand in a camera's frame: one answer, or two for a plane.
 
     ``points_mm`` (n, 3) with n >= 4, ``normalised`` (n, 2) undistorted. Seen through a long lens
@@ -54,17 +52,17 @@ def placed_candidates(points_mm: Floats, normalised: Floats) -> list[Placed]:
         points, axes = _in_plane(points)
     points = np.ascontiguousarray(points)
     try:
-        _, turns, shifts, _ = cv2.solvePnPGeneric(
+        _, rotations, translations, _ = cv2.solvePnPGeneric(
             points, np.ascontiguousarray(normalised), np.eye(3), None, flags=method
         )
     except cv2.error:
         return []  # OpenCV's way to say that the points are degenerate
     found = []
-    for turn, shift in zip(turns, shifts, strict=True):
+    for turn, translation in zip(rotations, translations, strict=True):
         rotation = rotation_of(np.asarray(turn, np.float64).reshape(3)) @ axes
-        moved = np.asarray(shift, np.float64).reshape(3) - rotation @ centre
+        moved = np.asarray(translation, np.float64).reshape(3) - rotation @ centre
         if np.isfinite(rotation).all() and np.isfinite(moved).all():
-            found.append(Placed(rotation, moved))
+            found.append(RigidTransform(rotation, moved))
     return found
 
 
@@ -105,7 +103,9 @@ def _in_plane(points: Floats) -> tuple[Floats, Floats]:
     return flat, np.asarray(axes)
 
 
-def relative_pose(first: Floats, second: Floats, tolerance: float) -> tuple[Placed, Bools] | None:
+def relative_pose(
+    first: Floats, second: Floats, tolerance: float
+) -> tuple[RigidTransform, Bools] | None:
     """The second camera's frame from the first's, with a base of length 1, and the inliers (n,).
 
     ``first``, ``second`` (n, 2) are normalised coordinates of the same points, ``tolerance`` in
@@ -119,10 +119,10 @@ def relative_pose(first: Floats, second: Floats, tolerance: float) -> tuple[Plac
         )
         if essential is None or essential.shape != (3, 3):
             return None
-        count, rotation, shift, mask = cv2.recoverPose(essential, a, b, np.eye(3), mask=mask)
+        count, rotation, translation, mask = cv2.recoverPose(essential, a, b, np.eye(3), mask=mask)
     except cv2.error:
         return None  # too few points, or degenerate ones
     if count < 6:
         return None
-    pose = Placed(np.asarray(rotation), np.asarray(shift).reshape(3))
+    pose = RigidTransform(np.asarray(rotation), np.asarray(translation).reshape(3))
     return pose, np.asarray(np.ravel(mask) > 0)

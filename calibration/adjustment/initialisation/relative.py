@@ -8,9 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from calibration.adjustment.finite import finite_rows
-from calibration.adjustment.start.chain import compose
-from calibration.adjustment.start.rays import nearest_points
-from calibration.adjustment.start.resection import Placed, placed_candidates, relative_pose
+from calibration.adjustment.initialisation.chain import compose
+from calibration.adjustment.initialisation.rays import nearest_points
+from calibration.adjustment.initialisation.resection import (
+    RigidTransform,
+    placed_candidates,
+    relative_pose,
+)
 from geometry.arrays import Floats, Ints
 
 LEAST_COMMON = 8
@@ -31,16 +35,16 @@ class Scene:
         """Number of points."""
         return int(self.point.max(initial=-1)) + 1
 
-    def points(self, poses: dict[int, Placed]) -> Floats:
+    def points(self, poses: dict[int, RigidTransform]) -> Floats:
         """Points (p, 3) from the rays of posed cameras; NaN where too few meet."""
         used = np.flatnonzero(np.isin(self.camera, list(poses)))
-        ways = np.c_[self.normalised[used], np.ones(len(used))]
-        turns = np.stack([poses[int(c)].rotation for c in self.camera[used]])
-        shifts = np.stack([poses[int(c)].shift_mm for c in self.camera[used]])
-        ways = np.einsum("nji,nj->ni", turns, ways)
-        ways /= np.linalg.norm(ways, axis=1, keepdims=True)
-        origins = -np.einsum("nji,nj->ni", turns, shifts)
-        return nearest_points(origins, ways, self.point[used], self.point_count)
+        directions = np.c_[self.normalised[used], np.ones(len(used))]
+        rotations = np.stack([poses[int(c)].rotation for c in self.camera[used]])
+        translations = np.stack([poses[int(c)].translation_mm for c in self.camera[used]])
+        directions = np.einsum("nji,nj->ni", rotations, directions)
+        directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+        origins = -np.einsum("nji,nj->ni", rotations, translations)
+        return nearest_points(origins, directions, self.point[used], self.point_count)
 
     def table(self) -> Floats:
         """Normalised coordinates (cameras, p, 2), NaN where unseen."""
@@ -49,7 +53,7 @@ class Scene:
         return out
 
 
-def relative_chain(scene: Scene) -> dict[int, Placed]:
+def relative_chain(scene: Scene) -> dict[int, RigidTransform]:
     """Poses (world to camera) in a frame of any size; only the cameras that could be joined."""
     table = scene.table()
     poses = _seed(table, scene)
@@ -66,7 +70,7 @@ def relative_chain(scene: Scene) -> dict[int, Placed]:
     return poses
 
 
-def _resect(points: Floats, normalised: Floats) -> Placed | None:
+def _resect(points: Floats, normalised: Floats) -> RigidTransform | None:
     if len(points) < LEAST_COMMON:
         return None
     found = placed_candidates(points, normalised)
@@ -77,9 +81,9 @@ def _resect(points: Floats, normalised: Floats) -> Placed | None:
     )
 
 
-def _seed(table: Floats, scene: Scene) -> dict[int, Placed]:
+def _seed(table: Floats, scene: Scene) -> dict[int, RigidTransform]:
     """The pair of cameras that fixes most points well: many points, wide angles."""
-    best: tuple[float, dict[int, Placed]] = (0.0, {})
+    best: tuple[float, dict[int, RigidTransform]] = (0.0, {})
     for a, b in itertools.combinations(range(len(table)), 2):
         common = np.isfinite(table[[a, b]]).all(axis=(0, 2))
         if common.sum() < LEAST_COMMON:
@@ -88,7 +92,7 @@ def _seed(table: Floats, scene: Scene) -> dict[int, Placed]:
         found = relative_pose(table[a, common], table[b, common], TOLERANCE_PX / focal)
         if found is None:
             continue
-        poses = {a: Placed(np.eye(3), np.zeros(3))}
+        poses = {a: RigidTransform(np.eye(3), np.zeros(3))}
         poses[b] = compose(found[0], poses[a])
         points = scene.points(poses)[common][found[1]]
         depth = np.median(points[finite_rows(points), 2])

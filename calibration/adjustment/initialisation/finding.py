@@ -9,16 +9,16 @@ import numpy as np
 from calibration.adjustment.build import Start, build, camera_poses
 from calibration.adjustment.camera import CalibratedCamera, Interior
 from calibration.adjustment.finite import finite_rows
+from calibration.adjustment.initialisation.carrierposes import Placing, place_carriers, row_rays
+from calibration.adjustment.initialisation.chain import LocatedView, chain, located_views
+from calibration.adjustment.initialisation.frame import as_cameras, to_start, upright
+from calibration.adjustment.initialisation.interiors import start_interiors
+from calibration.adjustment.initialisation.relative import Scene, relative_chain
+from calibration.adjustment.initialisation.resection import RigidTransform
+from calibration.adjustment.initialisation.scale import knows_size, size_of
+from calibration.adjustment.initialisation.views import Placements, View, nominal_points, views_of
 from calibration.adjustment.model import project
 from calibration.adjustment.options import CalibrationOptions
-from calibration.adjustment.start.chain import Sighted, chain, sighted
-from calibration.adjustment.start.frame import as_cameras, to_start, upright
-from calibration.adjustment.start.interiors import start_interiors
-from calibration.adjustment.start.places import Placing, place_carriers, row_rays
-from calibration.adjustment.start.relative import Scene, relative_chain
-from calibration.adjustment.start.resection import Placed
-from calibration.adjustment.start.sizes import knows_size, size_of
-from calibration.adjustment.start.views import Placements, View, nominal_points, views_of
 from calibration.observations import Observations
 from common.errors import InputError
 from geometry.arrays import Floats
@@ -38,19 +38,19 @@ class _Scenery:
     nominal_mm: Floats
     interiors: tuple[Interior, ...]
     normalised: Floats
-    sighted: tuple[Sighted, ...]
+    located_views: tuple[LocatedView, ...]
 
     @property
     def focal_px(self) -> Floats:
         return np.array([i.focal_length_px for i in self.interiors])
 
-    def placing(self, poses: dict[int, Placed]) -> Placing:
+    def placing(self, poses: dict[int, RigidTransform]) -> Placing:
         """Carriers and targets with the cameras in these poses."""
         seen = self.observations
         rays = row_rays(poses, seen.camera, self.normalised, self.placements, seen.target)
         return place_carriers(
             poses,
-            self.sighted,
+            self.located_views,
             rays,
             self.placements,
             self.nominal_mm,
@@ -97,9 +97,9 @@ def median_misfit_px(start: Start) -> float:
     """Median misfit of a start's image points, pixels; infinite without any."""
     if len(start.rows) == 0:
         return float("inf")
-    pixel, depth = project(start.state, start.network.sight)
-    off = np.linalg.norm(start.network.pixel - pixel, axis=1)
-    return float(np.median(np.where(depth > 0.0, off, np.inf)))
+    pixel, depth = project(start.state, start.network.observed)
+    residual = np.linalg.norm(start.network.pixel - pixel, axis=1)
+    return float(np.median(np.where(depth > 0.0, residual, np.inf)))
 
 
 def _ordered(
@@ -129,13 +129,13 @@ def _scenery(observations: Observations, options: CalibrationOptions) -> _Scener
     for k, interior in enumerate(interiors):
         own = observations.camera == k
         normalised[own] = interior.normalised(observations.pixel[own])
-    found = sighted(views, observations.target, normalised, nominal)
+    found = located_views(views, observations.target, normalised, nominal)
     return _Scenery(observations, placements, views, nominal, interiors, normalised, found)
 
 
-def _from_images(scenery: _Scenery) -> dict[int, Placed]:
+def _from_images(scenery: _Scenery) -> dict[int, RigidTransform]:
     """Poses of all cameras from images, in the size that the targets give."""
-    poses = chain(scenery.sighted, scenery.focal_px)
+    poses = chain(scenery.located_views, scenery.focal_px)
     count = len(scenery.interiors)
     if len(poses) == count:
         return poses
@@ -146,7 +146,7 @@ def _from_images(scenery: _Scenery) -> dict[int, Placed]:
     other = relative_chain(scene)
     if len(other) == count:
         scale = size_of(scene.points(other), pairs[:, 0], pairs[:, 1], seen.targets)
-        return {k: Placed(p.rotation, scale * p.shift_mm) for k, p in other.items()}
+        return {k: RigidTransform(p.rotation, scale * p.translation_mm) for k, p in other.items()}
     joined = poses if len(poses) >= len(other) else other
     alone = [name for k, name in enumerate(seen.cameras) if k not in joined]
     raise InputError(
@@ -156,14 +156,14 @@ def _from_images(scenery: _Scenery) -> dict[int, Placed]:
     )
 
 
-def _middle(scenery: _Scenery, poses: dict[int, Placed]) -> Floats:
+def _middle(scenery: _Scenery, poses: dict[int, RigidTransform]) -> Floats:
     """The middle of what the cameras see, in the world of the poses."""
     placing = scenery.placing(poses)
-    shifts = [p.rotation @ m + p.shift_mm for p, m in _placed_middles(placing, scenery)]
-    return np.median(np.stack(shifts), axis=0) if shifts else np.zeros(3)
+    translations = [p.rotation @ m + p.translation_mm for p, m in _placed_middles(placing, scenery)]
+    return np.median(np.stack(translations), axis=0) if translations else np.zeros(3)
 
 
-def _placed_middles(placing: Placing, scenery: _Scenery) -> list[tuple[Placed, Floats]]:
+def _placed_middles(placing: Placing, scenery: _Scenery) -> list[tuple[RigidTransform, Floats]]:
     out = []
     carrier_of = scenery.observations.targets.carrier_of
     for k, placed in enumerate(placing.placed):

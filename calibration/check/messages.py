@@ -86,9 +86,9 @@ def scale(ppm: float) -> str:
 
 def ids(pairs: tuple[tuple[str, str], ...]) -> str:
     """Targets carry each other's ids."""
-    told = ", ".join(f"{a} is where {b} belongs" for a, b in pairs[:4])
+    reported = ", ".join(f"{a} is where {b} belongs" for a, b in pairs[:4])
     more = f" and {len(pairs) - 4} more" if len(pairs) > 4 else ""
-    return f"Targets carry swapped ids: {told}{more}."
+    return f"Targets carry swapped ids: {reported}{more}."
 
 
 def cameras_swapped(names: tuple[str, ...]) -> str:

@@ -11,13 +11,13 @@ LEAST_ANGLE = 1e-4
 
 
 def nearest_points(
-    origins: Floats, ways: Floats, group: Ints, count: int, weights: Floats | None = None
+    origins: Floats, directions: Floats, group: Ints, count: int, weights: Floats | None = None
 ) -> Floats:
     """Points (count, 3) nearest to rays (n, 3) + (n, 3) of each ``group`` (n,).
 
     NaN for groups with fewer than two rays, or rays that are all but parallel.
     """
-    across = np.eye(3) - ways[:, :, None] * ways[:, None, :]
+    across = np.eye(3) - directions[:, :, None] * directions[:, None, :]
     if weights is not None:
         across *= weights[:, None, None]
     matrix = _sums(across.reshape(-1, 9), group, count).reshape(-1, 3, 3)

@@ -100,8 +100,8 @@ def late_points(solution: Solution, network: Network) -> Bools:
 
     Of each place the worst view only: the others may have suffered from it.
     """
-    sight, misfit = network.sight, misfits(solution.residuals, network)
-    keys = sight.camera * network.pose_count + sight.pose
+    observed, misfit = network.observed, misfits(solution.residuals, network)
+    keys = observed.camera * network.pose_count + observed.pose
     views, view = np.unique(keys, return_inverse=True)
     view = view.reshape(-1)
     middle = np.array([np.median(misfit[view == k]) for k in range(len(views))])
@@ -136,7 +136,7 @@ def _blunders(network: Network, found: Reliability, rescale: bool) -> Bools:
                 # The median of chi-square with two degrees of freedom is 2 log 2.
                 t[own] /= max(1.0, float(np.median(t[own])) / (2.0 * np.log(2.0)))
     bad = t > chi2.isf(BLUNDER_CHANCE / max(len(t), 1), 2)
-    key = network.sight.pose * network.target_count + network.sight.target
+    key = network.observed.pose * network.target_count + network.observed.target
     worst = np.zeros(int(key.max(initial=0)) + 1)
     np.maximum.at(worst, key, t)
     bad &= t >= worst[key]

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from calibration.adjustment.finite import finite_rows
+from calibration.adjustment.initialisation.chain import LocatedView, compose, inverse
+from calibration.adjustment.initialisation.rays import nearest_points
+from calibration.adjustment.initialisation.resection import RigidTransform
+from calibration.adjustment.initialisation.views import Placements
 from calibration.adjustment.rotations import similarity
-from calibration.adjustment.start.chain import Sighted, compose, inverse
-from calibration.adjustment.start.rays import nearest_points
-from calibration.adjustment.start.resection import Placed
-from calibration.adjustment.start.views import Placements
 from geometry.arrays import Bools, Floats, Ints
 
 CAP_PX = 100.0
@@ -36,27 +36,31 @@ class Placing:
     define the frame of a carrier without coordinates.
     """
 
-    placed: tuple[Placed | None, ...]
+    placed: tuple[RigidTransform | None, ...]
     target_mm: Floats
     held: Bools
 
 
 def row_rays(
-    poses: dict[int, Placed], camera: Ints, normalised: Floats, placements: Placements, target: Ints
+    poses: dict[int, RigidTransform],
+    camera: Ints,
+    normalised: Floats,
+    placements: Placements,
+    target: Ints,
 ) -> RowRays:
     """Rays of all rows whose camera has a pose; the others get NaN."""
     origin, way = np.full((len(camera), 3), np.nan), np.full((len(camera), 3), np.nan)
     for index, pose in poses.items():
         rows = camera == index
-        ways = np.c_[normalised[rows], np.ones(int(rows.sum()))] @ pose.rotation
-        way[rows] = ways / np.linalg.norm(ways, axis=1, keepdims=True)
-        origin[rows] = -pose.rotation.T @ pose.shift_mm
+        directions = np.c_[normalised[rows], np.ones(int(rows.sum()))] @ pose.rotation
+        way[rows] = directions / np.linalg.norm(directions, axis=1, keepdims=True)
+        origin[rows] = -pose.rotation.T @ pose.translation_mm
     return RowRays(placements.of_row, target, origin, way)
 
 
 def place_carriers(
-    poses: dict[int, Placed],
-    views: tuple[Sighted, ...],
+    poses: dict[int, RigidTransform],
+    views: tuple[LocatedView, ...],
     rays: RowRays,
     placements: Placements,
     nominal_mm: Floats,
@@ -73,7 +77,7 @@ def place_carriers(
         places = np.flatnonzero(placements.carrier == carrier)
         if not finite_rows(target[own]).any():
             best = int(max(places, key=lambda p: finite_rows(world[p][own]).sum()))
-            placed[best], held[best] = Placed(np.eye(3), np.zeros(3)), True
+            placed[best], held[best] = RigidTransform(np.eye(3), np.zeros(3)), True
             target[own] = world[best][own]
         _fit_missing(placed, places, world, target, own)
         _fill_unknown(placed, places, world, target, own)
@@ -81,13 +85,13 @@ def place_carriers(
 
 
 def _from_resections(
-    poses: dict[int, Placed], views: tuple[Sighted, ...], count: int, focal_px: Floats
-) -> list[Placed | None]:
-    by_place: list[list[Sighted]] = [[] for _ in range(count)]
+    poses: dict[int, RigidTransform], views: tuple[LocatedView, ...], count: int, focal_px: Floats
+) -> list[RigidTransform | None]:
+    by_place: list[list[LocatedView]] = [[] for _ in range(count)]
     for one in views:
         if one.view.camera in poses:
             by_place[one.view.place].append(one)
-    out: list[Placed | None] = []
+    out: list[RigidTransform | None] = []
     for group in by_place:
         answers = [
             compose(inverse(poses[one.view.camera]), candidate)
@@ -100,7 +104,10 @@ def _from_resections(
 
 
 def _cost(
-    placed: Placed, group: list[Sighted], poses: dict[int, Placed], focal_px: Floats
+    placed: RigidTransform,
+    group: list[LocatedView],
+    poses: dict[int, RigidTransform],
+    focal_px: Floats,
 ) -> float:
     return sum(
         min(
@@ -120,18 +127,18 @@ def _points_by_place(rays: RowRays, places: int, targets: int) -> Floats:
 
 
 def _fit_missing(
-    placed: list[Placed | None], places: Ints, world: Floats, target: Floats, own: Bools
+    placed: list[RigidTransform | None], places: Ints, world: Floats, target: Floats, own: Bools
 ) -> None:
     """Places that no resection gave: a fit of the intersected targets, as for a bar of two."""
     for place in places:
         both = own & finite_rows(target) & finite_rows(world[place])
         if placed[place] is None and both.sum() >= 2:
-            _, rotation, shift = similarity(target[both], world[place][both])
-            placed[place] = Placed(rotation, shift)
+            _, rotation, translation = similarity(target[both], world[place][both])
+            placed[place] = RigidTransform(rotation, translation)
 
 
 def _fill_unknown(
-    placed: list[Placed | None], places: Ints, world: Floats, target: Floats, own: Bools
+    placed: list[RigidTransform | None], places: Ints, world: Floats, target: Floats, own: Bools
 ) -> None:
     """Targets without coordinates: their mean over all places, in the carrier's frame."""
     missing = np.flatnonzero(own & ~finite_rows(target))
@@ -141,7 +148,7 @@ def _fill_unknown(
     for place in places:
         pose = placed[place]
         if pose is not None:
-            seen.append((world[place][missing] - pose.shift_mm) @ pose.rotation)
+            seen.append((world[place][missing] - pose.translation_mm) @ pose.rotation)
     if seen:
         stack = np.stack(seen)
         good = np.isfinite(stack).all(axis=2, keepdims=True)

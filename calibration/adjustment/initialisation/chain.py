@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from calibration.adjustment.finite import finite_rows
-from calibration.adjustment.start.resection import Placed, placed_candidates
-from calibration.adjustment.start.views import View
+from calibration.adjustment.initialisation.resection import RigidTransform, placed_candidates
+from calibration.adjustment.initialisation.views import View
 from geometry.arrays import Floats, Ints
 
 LEAST_POINTS = 4
@@ -18,25 +18,25 @@ MOST_SHARED = 10
 
 
 @dataclass(frozen=True, eq=False)
-class Sighted:
+class LocatedView:
     """A view with its carrier's coordinates and where the carrier may stand."""
 
     view: View
     points_mm: Floats
     normalised: Floats
-    candidates: tuple[Placed, ...]
+    candidates: tuple[RigidTransform, ...]
 
-    def misfit(self, placed: Placed, focal_px: float) -> float:
+    def misfit(self, placed: RigidTransform, focal_px: float) -> float:
         """Root mean square misfit in pixels; infinite behind the camera."""
-        off = (placed.image(self.points_mm) - self.normalised) * focal_px
-        if not np.isfinite(off).all():
+        residual = (placed.image(self.points_mm) - self.normalised) * focal_px
+        if not np.isfinite(residual).all():
             return np.inf
-        return float(np.sqrt(np.mean(np.sum(off * off, axis=1))))
+        return float(np.sqrt(np.mean(np.sum(residual * residual, axis=1))))
 
 
-def sighted(
+def located_views(
     views: tuple[View, ...], target: Ints, normalised: Floats, points_mm: Floats
-) -> tuple[Sighted, ...]:
+) -> tuple[LocatedView, ...]:
     """Views of carriers whose coordinates are known well enough for a resection.
 
     ``target`` and ``normalised`` (n, 2) by row; ``points_mm`` (m, 3), NaN where unknown.
@@ -50,25 +50,26 @@ def sighted(
         image = normalised[view.rows][known]
         found = placed_candidates(points[known], image)
         if found:
-            out.append(Sighted(view, points[known], image, tuple(found)))
+            out.append(LocatedView(view, points[known], image, tuple(found)))
     return tuple(out)
 
 
-def compose(second: Placed, first: Placed) -> Placed:
+def compose(second: RigidTransform, first: RigidTransform) -> RigidTransform:
     """``second`` after ``first``."""
-    return Placed(
-        second.rotation @ first.rotation, second.rotation @ first.shift_mm + second.shift_mm
+    return RigidTransform(
+        second.rotation @ first.rotation,
+        second.rotation @ first.translation_mm + second.translation_mm,
     )
 
 
-def inverse(placed: Placed) -> Placed:
+def inverse(placed: RigidTransform) -> RigidTransform:
     """The other way round."""
-    return Placed(placed.rotation.T, -placed.rotation.T @ placed.shift_mm)
+    return RigidTransform(placed.rotation.T, -placed.rotation.T @ placed.translation_mm)
 
 
-def chain(views: tuple[Sighted, ...], focal_px: Floats) -> dict[int, Placed]:
+def chain(views: tuple[LocatedView, ...], focal_px: Floats) -> dict[int, RigidTransform]:
     """Poses (world to camera) of all cameras that hang together with the best connected one."""
-    by_camera: dict[int, dict[int, Sighted]] = defaultdict(dict)
+    by_camera: dict[int, dict[int, LocatedView]] = defaultdict(dict)
     for one in views:
         by_camera[one.view.camera][one.view.place] = one
     links = {}
@@ -82,9 +83,11 @@ def chain(views: tuple[Sighted, ...], focal_px: Floats) -> dict[int, Placed]:
     return _tree(root, links)
 
 
-def _tree(root: int, links: dict[tuple[int, int], tuple[Placed, float]]) -> dict[int, Placed]:
+def _tree(
+    root: int, links: dict[tuple[int, int], tuple[RigidTransform, float]]
+) -> dict[int, RigidTransform]:
     """Camera by camera over the link that fits best (Prim)."""
-    poses = {root: Placed(np.eye(3), np.zeros(3))}
+    poses = {root: RigidTransform(np.eye(3), np.zeros(3))}
     while True:
         open_links = [
             (cost, a, b) for (a, b), (_, cost) in links.items() if a in poses and b not in poses
@@ -96,12 +99,12 @@ def _tree(root: int, links: dict[tuple[int, int], tuple[Placed, float]]) -> dict
 
 
 def _link(
-    first: dict[int, Sighted], second: dict[int, Sighted], focal_px: Floats
-) -> tuple[Placed, float] | None:
+    first: dict[int, LocatedView], second: dict[int, LocatedView], focal_px: Floats
+) -> tuple[RigidTransform, float] | None:
     """How to get from the first camera's frame to the second's, and its cost."""
     shared = sorted(set(first) & set(second), key=lambda p: (-len(second[p].points_mm), p))
     shared = shared[:: max(1, len(shared) // MOST_SHARED)][:MOST_SHARED]
-    best: tuple[Placed, float] | None = None
+    best: tuple[RigidTransform, float] | None = None
     for place in shared:
         for a in first[place].candidates:
             for b in second[place].candidates:
@@ -116,9 +119,9 @@ def _link(
 
 
 def _disagreement(
-    pose: Placed,
-    first: dict[int, Sighted],
-    second: dict[int, Sighted],
+    pose: RigidTransform,
+    first: dict[int, LocatedView],
+    second: dict[int, LocatedView],
     shared: list[int],
     focal_px: Floats,
 ) -> float:

@@ -1,1 +1,0 @@
-"""Where files come and go: read strictly with one-line errors, written whole or not at all."""
