@@ -1,5 +1,6 @@
 # make demo    set everything up and design a rig for the bundled head
 # make test    set everything up and pass the tests (the quick ones)
+# make mutation  plant faults in named modules, and see whether the quick tests notice
 # make check   lint, types, layers
 # make firmware    build the trigger box's firmware (needs gcc-avr, avr-libc)
 # make help    this list
@@ -14,7 +15,7 @@ OUT ?= out/demo
 TESTS_SIDE_BY_SIDE := -n auto --dist loadfile
 QUICK_WORKERS ?= $(shell $(PYTHON) -c 'import os; print((os.cpu_count() or 1) + 1)')
 
-.PHONY: help firmware demo test test-slow test-all check format docs benchmarks clean
+.PHONY: help firmware demo mutation test test-slow test-all check format docs benchmarks clean
 
 help:
 	@sed -n 's/^# make/make/p' Makefile
@@ -36,6 +37,9 @@ test-slow: $(STAMP)
 	$(BIN)/python -m pytest $(TESTS_SIDE_BY_SIDE) -m slow
 
 test-all: test test-slow
+
+mutation: $(STAMP)
+	$(BIN)/python -m benchmarks.mutation
 
 check: $(STAMP)
 	$(BIN)/ruff check .
