@@ -22,7 +22,7 @@ BETWEEN_MM = 36.0
 
 
 @dataclass(frozen=True)
-class View:
+class SheetView:
     """How the rig is looked at: axes to the right, up and towards the viewer, in the rig."""
 
     title: str
@@ -35,16 +35,16 @@ class View:
         return np.array([self.right, self.up, np.cross(self.right, self.up)])
 
 
-FRONT = View("Front: from behind the cameras", (1, 0, 0), (0, 0, 1))
-TOP = View("Top", (1, 0, 0), (0, 1, 0))
-SIDE = View("Right side", (0, 1, 0), (0, 0, 1))
+FRONT = SheetView("Front: from behind the cameras", (1, 0, 0), (0, 0, 1))
+TOP = SheetView("Top", (1, 0, 0), (0, 1, 0))
+SIDE = SheetView("Right side", (0, 1, 0), (0, 0, 1))
 
 
 @dataclass(frozen=True, eq=False)
-class Placed:
+class PlacedView:
     """A view on the paper: paper = ``origin_mm`` + (in the view - ``low_mm``) / denominator."""
 
-    view: View
+    view: SheetView
     low_mm: Floats
     high_mm: Floats
     origin_mm: Floats
@@ -64,7 +64,7 @@ class Placed:
         return np.asarray((self.high_mm - self.low_mm) / self.denominator)
 
 
-def arranged(low: Floats, high: Floats) -> tuple[Placed, Placed, Placed]:
+def arranged(low: Floats, high: Floats) -> tuple[PlacedView, PlacedView, PlacedView]:
     """Front, top above it and side right of it, at the largest scale that fits."""
     width, depth, height = high - low
     across = A3_LANDSCAPE_MM[0] - 2.0 * MARGIN_MM - 2.0 * EDGE_MM - BETWEEN_MM
@@ -84,7 +84,7 @@ def arranged(low: Floats, high: Floats) -> tuple[Placed, Placed, Placed]:
         (left + width / n + BETWEEN_MM, base),
     )
     front, top, side = (
-        Placed(view, view.axes[:2] @ low, view.axes[:2] @ high, np.array(origin), float(n))
+        PlacedView(view, view.axes[:2] @ low, view.axes[:2] @ high, np.array(origin), float(n))
         for view, origin in zip((FRONT, TOP, SIDE), origins, strict=True)
     )
     return front, top, side

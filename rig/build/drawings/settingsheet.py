@@ -32,8 +32,8 @@ from rig.build.drawings.items import (
 from rig.build.drawings.layout import (
     FRONT,
     TOP,
-    Placed,
-    View,
+    PlacedView,
+    SheetView,
 )
 from rig.build.drawings.tables import (
     Table,
@@ -65,7 +65,7 @@ def setting_sheets(plan: MountPlan) -> tuple[Sheet, ...]:
 
 
 def _content(
-    plan: MountPlan, mount: CameraMount, maps: dict[str, tuple[Placed, list[Item]]]
+    plan: MountPlan, mount: CameraMount, maps: dict[str, tuple[PlacedView, list[Item]]]
 ) -> Content:
     top = A4_MM[1] - MARGIN_MM - 9.0
     items: list[Item] = [
@@ -128,14 +128,14 @@ def _tolerance(tolerance: Tolerance) -> str:
     return f"± {plus}" if plus == minus else f"+ {plus} / - {minus}"
 
 
-def _map(plan: MountPlan, view: View) -> tuple[Placed, list[Item]]:
+def _map(plan: MountPlan, view: SheetView) -> tuple[PlacedView, list[Item]]:
     """A small picture of the rig in which each sheet marks its camera."""
     solids = plan_solids(plan)
     corners = [s.corners_mm @ view.axes[:2].T for s in solids]
     everything = np.concatenate([*corners, (view.axes[:2] @ plan.datum_rig_mm)[None]])
     low, high = everything.min(axis=0), everything.max(axis=0)
     n = float(((high - low) / PICTURE_MM).max())
-    placed = Placed(view, low, high, np.zeros(2), n)
+    placed = PlacedView(view, low, high, np.zeros(2), n)
     items: list[Item] = [
         Line(outline(placed.flat(flat)), "thin", True)
         for solid, flat in zip(solids, corners, strict=True)
@@ -155,7 +155,7 @@ def _shifted(item: Item, shift: Floats) -> Item:
     return item
 
 
-def _highlighted(placed: Placed, mount: CameraMount, shift: Floats) -> list[Item]:
+def _highlighted(placed: PlacedView, mount: CameraMount, shift: Floats) -> list[Item]:
     """The camera of this sheet, with its optical axis and its name."""
     from rig.solids.bodies import place_body
 

@@ -37,7 +37,7 @@ from rig.build.drawings.items import (
 )
 from rig.build.drawings.layout import (
     EDGE_MM,
-    Placed,
+    PlacedView,
     arranged,
 )
 from rig.build.drawings.tables import (
@@ -113,7 +113,7 @@ def view_sheets(plan: MountPlan, subject_mm: Floats | None = None) -> tuple[Shee
 
 
 def _drawn(
-    view: Placed, plan: MountPlan, solids: list[Solid], subject_mm: Floats | None
+    view: PlacedView, plan: MountPlan, solids: list[Solid], subject_mm: Floats | None
 ) -> list[Item]:
     """What is seen in a view, with names and optical axes."""
     items: list[Item] = []
@@ -132,19 +132,19 @@ def _drawn(
     return [*items, Text(view.view.title, float(title_x), float(title_y), 2.6, bold=True)]
 
 
-def _named(views: tuple[Placed, Placed, Placed], plan: MountPlan) -> tuple[Placed, ...]:
+def _named(views: tuple[PlacedView, PlacedView, PlacedView], plan: MountPlan) -> tuple[PlacedView, ...]:
     """The views that name the cameras: of many cameras only the one that spreads them most."""
     if len(plan.mounts) <= MANY:
         return views
     centres = np.array([m.camera.pose.position_rig_mm for m in plan.mounts])
 
-    def spread(view: Placed) -> float:
+    def spread(view: PlacedView) -> float:
         return float(np.ptp(view.paper(centres), axis=0).prod())
 
     return (max(views, key=spread),)
 
 
-def _cameras(view: Placed, plan: MountPlan, *, named: bool) -> list[Item]:
+def _cameras(view: PlacedView, plan: MountPlan, *, named: bool) -> list[Item]:
     """Marks at the optical centres, the optical axes, the names, and the datum's."""
     items: list[Item] = []
     labels, many = Labels(), len(plan.mounts) > MANY
@@ -178,7 +178,7 @@ class _Built:
     size_words: tuple[str, str]
 
 
-def _built(view: Placed, solids: list[Solid]) -> _Built:
+def _built(view: PlacedView, solids: list[Solid]) -> _Built:
     ends = np.concatenate([s.corners_mm for s in solids]) @ view.view.axes[:2].T
     low, high = ends.min(axis=0), ends.max(axis=0)
     across, upwards = (mm(float(v)) for v in high - low)
@@ -186,7 +186,7 @@ def _built(view: Placed, solids: list[Solid]) -> _Built:
 
 
 def _dimensioned(
-    views: tuple[Placed, Placed, Placed], plan: MountPlan, solids: list[Solid]
+    views: tuple[PlacedView, PlacedView, PlacedView], plan: MountPlan, solids: list[Solid]
 ) -> list[Item]:
     """Overall sizes, and ordinates of cameras and members from the datum, each stated once."""
     front, top, side = views
@@ -216,7 +216,7 @@ def _size(built: _Built, axis: int) -> Dimension:
 
 
 def _row(
-    view: Placed, built: _Built, ordinates: list[Ordinate], axis: int, outwards: int
+    view: PlacedView, built: _Built, ordinates: list[Ordinate], axis: int, outwards: int
 ) -> list[Item]:
     """Ordinates beside what is built, when there is room for them all."""
     if len(merged(ordinates)) * PITCH_MM > max(float(view.size_mm[axis]), 30.0) + 12.0:
@@ -226,7 +226,7 @@ def _row(
     return ordinate_items(ordinates, float(start), reach, upright=axis == 1)
 
 
-def _ordinates(view: Placed, plan: MountPlan, points: Floats, axis: int) -> list[Ordinate]:
+def _ordinates(view: PlacedView, plan: MountPlan, points: Floats, axis: int) -> list[Ordinate]:
     """Coordinates of points (N, 3) along one axis of a view, from the datum."""
     if not len(points):
         return []
@@ -235,7 +235,7 @@ def _ordinates(view: Placed, plan: MountPlan, points: Floats, axis: int) -> list
     return [Ordinate(float(p), mm(float(f))) for p, f in zip(places, figures, strict=True)]
 
 
-def _across(view: Placed, members: tuple[Member, ...], axis: int) -> Floats:
+def _across(view: PlacedView, members: tuple[Member, ...], axis: int) -> Floats:
     """Middles (N, 3) of straight members that run square to one axis of a view."""
     middles = []
     for member in members:
@@ -283,7 +283,7 @@ def _structure_tables(plan: MountPlan) -> list[Table]:
     return [table for table in tables if table.rows]
 
 
-def _in_corner(views: tuple[Placed, Placed, Placed], table: Table) -> list[Item]:
+def _in_corner(views: tuple[PlacedView, PlacedView, PlacedView], table: Table) -> list[Item]:
     """The table in the room above the side view; nothing when it is too large for it."""
     _, top, side = views
     left = max(float(side.origin_mm[0]), float(top.origin_mm[0] + top.size_mm[0]) + EDGE_MM)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from geometry.raycast import Occluder
 from rig.build import (
-    wedges as brackets,
+    wedges,
     drawings,
     parts,
 )
@@ -75,7 +75,7 @@ class _Making:
 
     def __init__(self, plan: MountPlan, options: PlanOptions) -> None:
         self.plan, self.options = plan, options
-        self._printed: dict[str, tuple[brackets.PrintPart, trimesh.Trimesh]] = {}
+        self._printed: dict[str, tuple[wedges.PrintPart, trimesh.Trimesh]] = {}
 
     @cached_property
     def views(self) -> tuple[Sheet, ...]:
@@ -99,12 +99,12 @@ class _Making:
     def cuts(self) -> tuple[parts.Cut, ...]:
         return parts.cut_list(self.plan, self.options.catalogue)
 
-    def printed(self, index: int) -> tuple[brackets.PrintPart, trimesh.Trimesh]:
+    def printed(self, index: int) -> tuple[wedges.PrintPart, trimesh.Trimesh]:
         """Recipe and mesh of a wedge."""
         wedge = self.plan.structure.wedges[index]
         if wedge.id not in self._printed:
-            part = brackets.print_part(wedge, self.options.catalogue)
-            self._printed[wedge.id] = part, brackets.bracket_mesh(part)
+            part = wedges.print_part(wedge, self.options.catalogue)
+            self._printed[wedge.id] = part, wedges.wedge_mesh(part)
         return self._printed[wedge.id]
 
     def page(self) -> bytes:
@@ -119,7 +119,7 @@ def plan_files(plan: MountPlan, options: PlanOptions | None = None) -> dict[str,
     """Every file of a plan by its path in the folder; nothing is made before it is called."""
     making = _Making(plan, options or PlanOptions())
     files = [*_whole(making), *_lists(making), *_drawn(making), *_plates(making)]
-    files += [*_setting_sheets(making), *_brackets(making)]
+    files += [*_setting_sheets(making), *_wedges(making)]
     return {file.name: file for file in files}
 
 
@@ -213,12 +213,12 @@ def _picked(making: _Making, index: int) -> Callable[[], tuple[Sheet, ...]]:
     return lambda: making.settings[index : index + 1]
 
 
-def _brackets(making: _Making) -> Iterable[PlanFile]:
-    wedges = making.plan.structure.wedges
-    for index, stem in enumerate(_stems([wedge.id for wedge in wedges])):
-        wedge = wedges[index]
+def _wedges(making: _Making) -> Iterable[PlanFile]:
+    placed = making.plan.structure.wedges
+    for index, stem in enumerate(_stems([wedge.id for wedge in placed])):
+        wedge = placed[index]
         words = f"printed wedge of {wedge.camera}, mm, lying as it is printed"
-        made = {"stl": brackets.bracket_stl, "3mf": brackets.bracket_3mf}
+        made = {"stl": wedges.wedge_stl, "3mf": wedges.wedge_3mf}
         for ending, write in made.items():
             make = _printed(making, index, write)
             yield PlanFile(f"brackets/{stem}.{ending}", words, make)
@@ -229,13 +229,13 @@ def _brackets(making: _Making) -> Iterable[PlanFile]:
 def _printed(
     making: _Making,
     index: int,
-    write: Callable[[brackets.PrintPart, trimesh.Trimesh], bytes],
+    write: Callable[[wedges.PrintPart, trimesh.Trimesh], bytes],
 ) -> Callable[[], bytes]:
     return lambda: write(*making.printed(index))
 
 
 def _stepped(making: _Making, index: int) -> Callable[[], bytes]:
-    return lambda: brackets.bracket_step(making.printed(index)[0])
+    return lambda: wedges.wedge_step(making.printed(index)[0])
 
 
 def _stems(names: list[str]) -> list[str]:

@@ -8,7 +8,7 @@ from geometry.camera import RigCamera
 from rig.build.mounts.plan import Clash
 from rig.build.mounts.shapes import (
     Crowd,
-    Shape,
+    ConvexShape,
     gap_mm,
 )
 from rig.build.mounts.structure import Solid
@@ -43,7 +43,7 @@ def find_clashes(
     around: Surroundings,
 ) -> tuple[Clash, ...]:
     """Every clash of a structure; of many between the same two things the worst."""
-    shapes = [Shape(solid.corners_mm) for solid in solids]
+    shapes = [ConvexShape(solid.corners_mm) for solid in solids]
     crowd = Crowd(shapes)
     found = list(_solid_clashes(solids, shapes, crowd, joined, around))
     found += _view_clashes(solids, shapes, crowd, cameras, around)
@@ -58,7 +58,7 @@ def find_clashes(
 
 def _solid_clashes(
     solids: tuple[Solid, ...],
-    shapes: list[Shape],
+    shapes: list[ConvexShape],
     crowd: Crowd,
     joined: Joined,
     around: Surroundings,
@@ -79,7 +79,7 @@ def _solid_clashes(
 
 def _view_clashes(
     solids: tuple[Solid, ...],
-    shapes: list[Shape],
+    shapes: list[ConvexShape],
     crowd: Crowd,
     cameras: tuple[RigCamera, ...],
     around: Surroundings,
@@ -100,7 +100,7 @@ def _view_clashes(
 
 
 def _zone_clashes(
-    solids: tuple[Solid, ...], shapes: list[Shape], crowd: Crowd, around: Surroundings
+    solids: tuple[Solid, ...], shapes: list[ConvexShape], crowd: Crowd, around: Surroundings
 ) -> Iterator[Clash]:
     for zone in around.zones:
         for k in crowd.near(zone.shape, 0.0):
@@ -121,7 +121,7 @@ class Site:
     ) -> None:
         self._around, self._extra = around, extra_mm
         self._solids = list(solids)
-        self._crowd = Crowd([Shape(solid.corners_mm) for solid in solids])
+        self._crowd = Crowd([ConvexShape(solid.corners_mm) for solid in solids])
         views = [view for view in map(around.view, cameras) if view is not None]
         self._views = Crowd(views)
         self._zones = Crowd([zone.shape for zone in around.zones])
@@ -129,14 +129,14 @@ class Site:
     def add(self, solids: tuple[Solid, ...]) -> None:
         """Put a part in its place."""
         self._solids += solids
-        self._crowd.add([Shape(solid.corners_mm) for solid in solids])
+        self._crowd.add([ConvexShape(solid.corners_mm) for solid in solids])
 
     def clashes(self, solids: tuple[Solid, ...], joined: Joined) -> int:
         """How many clashes these solids would bring, with ``extra_mm`` of room to move."""
         return sum(self._of(solid, joined) for solid in solids)
 
     def _of(self, solid: Solid, joined: Joined) -> int:
-        shape, count = Shape(solid.corners_mm), 0
+        shape, count = ConvexShape(solid.corners_mm), 0
         for k in self._crowd.near(shape, self._around.clearance_mm + self._extra):
             required = required_mm(solid, self._solids[k], joined, self._around)
             if required is not None:

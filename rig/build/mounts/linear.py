@@ -22,7 +22,7 @@ CENTRED = 0.9
 
 
 @dataclass(frozen=True, eq=False)
-class Linear:
+class LinearLimits:
     """Rows of the limits about the present settings.
 
     ``jacobian`` (r, m) of the ``slack`` (r,) by the slides; ``size`` (r,) as in
@@ -79,7 +79,7 @@ class LinearModel:
             self._worst[name] = self._worst.get(name, 0.0) + effect
             self._square[name] = self._square.get(name, 0.0) + effect**2
 
-    def made(self) -> Linear:
+    def made(self) -> LinearLimits:
         """The model."""
         names, table = list(self._rows), list(self._rows.values())
         index = {name: i for i, name in enumerate(names)}
@@ -87,7 +87,7 @@ class LinearModel:
         for column, entries in enumerate(self._entries):
             for name, value in entries.items():
                 jacobian[index[name], column] = value
-        return Linear(
+        return LinearLimits(
             tuple(names),
             jacobian,
             np.array([row.slack for row in table]),

@@ -63,7 +63,7 @@ class Score:
     cost_mm2: float
 
 
-class Network:
+class MountNetwork:
     """Cameras, of which one at a time may be tried elsewhere and then moved."""
 
     def __init__(self, subject: Subject, limits: Limits, cameras: tuple[RigCamera, ...]) -> None:

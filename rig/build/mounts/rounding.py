@@ -27,11 +27,11 @@ from rig.build.mounts.kinematics import (
     rotation_at,
 )
 from rig.build.mounts.linear import (
-    Linear,
+    LinearLimits,
     LinearModel,
 )
 from rig.build.mounts.network import (
-    Network,
+    MountNetwork,
     Score,
 )
 from rig.build.mounts.settings import (
@@ -81,7 +81,7 @@ class Rounder:
         cancel: CancelToken,
     ) -> None:
         self._target = subject.design_points.centroid_mm
-        self._network = Network(subject, limits, cameras)
+        self._network = MountNetwork(subject, limits, cameras)
         names = [c.name for c in cameras]
         self._number = {m.name: names.index(m.name) for m in mounts}
         self._tell, self._cancel, self._spare = tell, cancel, spare
@@ -141,7 +141,7 @@ class Rounder:
         wanted = keeping_aim(mount.camera.pose, rotation_at(mount.chain, at), self._target)
         return mount.moved(reach(mount.chain, at, slides, wanted, with_rotation=False))
 
-    def _draw_in(self, linear: Linear, margins: Mapping[str, float]) -> None:
+    def _draw_in(self, linear: LinearLimits, margins: Mapping[str, float]) -> None:
         """Move the slides of all cameras so that no limit comes nearer than its margin."""
         move = linear.least_move(margins)
         done = 0
@@ -154,7 +154,7 @@ class Rounder:
             done += len(slides)
             self._set(k, mount.moved(values))
 
-    def _linear(self, *, margins: bool) -> Linear:
+    def _linear(self, *, margins: bool) -> LinearLimits:
         """How the slack of all rows follows the slides and, for margins, all settings."""
         model = LinearModel()
         for k, mount in enumerate(self.mounts):

@@ -13,7 +13,7 @@ from rig.solids.convex import signed_distance
 
 
 @dataclass(frozen=True, eq=False)
-class Shape:
+class ConvexShape:
     """The convex hull of ``corners_mm`` (K, 3)."""
 
     corners_mm: Floats
@@ -37,7 +37,7 @@ class Shape:
             # Flat or too few corners: no face can show that something lies outside of it.
             return np.zeros((0, 4))
 
-    def face_gap_mm(self, other: Shape) -> float:
+    def face_gap_mm(self, other: ConvexShape) -> float:
         """How far ``other`` lies outside of the face that keeps it out best."""
         faces = self.faces
         if not len(faces):
@@ -45,7 +45,7 @@ class Shape:
         return float((other.corners_mm @ faces[:, :3].T + faces[:, 3]).min(axis=0).max())
 
 
-def gap_mm(one: Shape, other: Shape, enough_mm: float) -> float:
+def gap_mm(one: ConvexShape, other: ConvexShape, enough_mm: float) -> float:
     """The gap, negative for an overlap; ``enough_mm`` or more is not told exactly."""
     bound = max(one.face_gap_mm(other), other.face_gap_mm(one))
     if bound >= enough_mm:
@@ -56,20 +56,20 @@ def gap_mm(one: Shape, other: Shape, enough_mm: float) -> float:
 class Crowd:
     """Solids in their places, to be asked what is near a new one."""
 
-    def __init__(self, shapes: list[Shape] | None = None) -> None:
-        self.shapes: list[Shape] = []
+    def __init__(self, shapes: list[ConvexShape] | None = None) -> None:
+        self.shapes: list[ConvexShape] = []
         self._low = np.zeros((0, 3))
         self._high = np.zeros((0, 3))
         self.add(shapes or [])
 
-    def add(self, shapes: list[Shape]) -> None:
+    def add(self, shapes: list[ConvexShape]) -> None:
         """Put more solids in."""
         if shapes:
             self.shapes += shapes
             self._low = np.concatenate([self._low, [s.low_mm for s in shapes]])
             self._high = np.concatenate([self._high, [s.high_mm for s in shapes]])
 
-    def near(self, shape: Shape, within_mm: float) -> list[int]:
+    def near(self, shape: ConvexShape, within_mm: float) -> list[int]:
         """Indices of the solids whose bounding box comes that near."""
         apart = np.maximum(self._low - shape.high_mm, shape.low_mm - self._high).max(axis=1)
         return [int(k) for k in np.flatnonzero(apart < within_mm)]

@@ -12,7 +12,7 @@ from geometry.camera import RigCamera
 from geometry.subject import Subject
 from rig.solids.convex import box_corners
 from rig.design.layout import foremost_point
-from rig.build.mounts.shapes import Shape
+from rig.build.mounts.shapes import ConvexShape
 from rig.solids.sight import (
     seen_by,
     view_corners,
@@ -33,10 +33,10 @@ class Zone:
     high_mm: Floats
 
     @cached_property
-    def shape(self) -> Shape:
+    def shape(self) -> ConvexShape:
         """The box as a solid."""
         low, high = np.asarray(self.low_mm), np.asarray(self.high_mm)
-        return Shape(box_corners(high - low, (low + high) / 2.0))
+        return ConvexShape(box_corners(high - low, (low + high) / 2.0))
 
 
 def head_entry(subject: Subject, floor_z_mm: float) -> Zone:
@@ -83,10 +83,10 @@ class Surroundings:
         """How far solids keep from a camera's view."""
         return self.limits.sight_line_clearance_mm or 0.0
 
-    def view(self, camera: RigCamera) -> Shape | None:
+    def view(self, camera: RigCamera) -> ConvexShape | None:
         """The volume between a camera and what it sees; None when it sees nothing."""
         points = self.subject.check_points
         seen = seen_by(camera, points, self.subject.occluder, self.limits.incidence.ray_max_deg)
         if not seen.any():
             return None
-        return Shape(view_corners(camera, points.points_mm[seen]))
+        return ConvexShape(view_corners(camera, points.points_mm[seen]))

@@ -10,7 +10,7 @@ import numpy as np
 from geometry.camera import RigCamera
 from common.errors import CancelledError
 from geometry.subject import Subject
-from rig.build.mounts.network import Network
+from rig.build.mounts.network import MountNetwork
 from rig.build.mounts.plan import Tolerance
 from rig.build.mounts.rounding import (
     PROBE_DEG,
@@ -59,7 +59,7 @@ class Tolerancer:
         tell: Callable[[float], None],
         cancel: CancelToken,
     ) -> None:
-        self._network = Network(subject, limits, cameras)
+        self._network = MountNetwork(subject, limits, cameras)
         names = [camera.name for camera in cameras]
         self._number = {mount.name: names.index(mount.name) for mount in mounts}
         self._mounts, self._tell, self._cancel = mounts, tell, cancel

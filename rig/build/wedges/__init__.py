@@ -1,24 +1,24 @@
 """Printed wedges that hold a camera's angles: their shape, and the files a printer takes."""
 
 from rig.build.wedges.files import (
-    bracket_3mf,
-    bracket_stl,
+    wedge_3mf,
+    wedge_stl,
 )
 from rig.build.wedges.recipe import PrintPart
 from rig.build.wedges.solid import (
-    bracket_mesh,
+    wedge_mesh,
     overhang_deg,
     print_part,
     wedge_corners_mm,
 )
-from rig.build.wedges.step import bracket_step
+from rig.build.wedges.step import wedge_step
 
 __all__ = [
     "PrintPart",
-    "bracket_3mf",
-    "bracket_mesh",
-    "bracket_step",
-    "bracket_stl",
+    "wedge_3mf",
+    "wedge_mesh",
+    "wedge_step",
+    "wedge_stl",
     "overhang_deg",
     "print_part",
     "wedge_corners_mm",

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from common.files.zip import zip_bytes
 from rig.build.wedges.recipe import PrintPart
-from rig.build.wedges.solid import bracket_mesh
+from rig.build.wedges.solid import wedge_mesh
 
 if TYPE_CHECKING:
     import trimesh
@@ -19,19 +19,19 @@ if TYPE_CHECKING:
 UUID = re.compile(rb'UUID="[0-9a-f-]{36}"')
 
 
-def bracket_stl(part: PrintPart, mesh: trimesh.Trimesh | None = None) -> bytes:
+def wedge_stl(part: PrintPart, mesh: trimesh.Trimesh | None = None) -> bytes:
     """The wedge as binary STL. STL names no unit; the numbers are millimetres."""
     from trimesh.exchange.stl import export_stl
 
-    solid = bracket_mesh(part) if mesh is None else mesh
+    solid = wedge_mesh(part) if mesh is None else mesh
     return bytes(export_stl(solid))
 
 
-def bracket_3mf(part: PrintPart, mesh: trimesh.Trimesh | None = None) -> bytes:
+def wedge_3mf(part: PrintPart, mesh: trimesh.Trimesh | None = None) -> bytes:
     """The wedge as 3MF, unit millimetre, the object named after the wedge."""
     import trimesh
 
-    solid = bracket_mesh(part) if mesh is None else mesh
+    solid = wedge_mesh(part) if mesh is None else mesh
     solid.units = "mm"
     scene = trimesh.Scene()
     scene.add_geometry(solid, node_name=part.name, geom_name=part.name)

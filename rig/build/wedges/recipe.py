@@ -21,7 +21,7 @@ from rig.build.wedges.fastenings import (
 from rig.build.wedges.shape import (
     FLANGE_MM,
     SEAT_MM,
-    Shape,
+    WedgeShape,
 )
 from rig.catalogue.catalogue import Catalogue
 from rig.build.mounts.structure import (
@@ -39,7 +39,7 @@ ORIENTATION = "as the file lies: on a side of the base, base and seat upright"
 
 
 @dataclass(frozen=True, eq=False)
-class Cut:
+class Recess:
     """Outlines extruded along z of ``print_from_cut`` (4, 4) from 0 to ``depth_mm``.
 
     ``radius_mm`` of a round hole (its outline then has a roof as well); ``end_share`` scales the
@@ -74,15 +74,15 @@ class PrintPart:
     name: str
     camera: str
     corners_mm: Floats
-    cuts: tuple[Cut, ...]
+    cuts: tuple[Recess, ...]
     letters_mm: float
     rig_from_print: Floats
     orientation: str = ORIENTATION
 
 
 def screw_cuts(
-    wedge: Wedge, shape: Shape, catalogue: Catalogue
-) -> tuple[tuple[Cut, ...], tuple[Bearing, ...]]:
+    wedge: Wedge, shape: WedgeShape, catalogue: Catalogue
+) -> tuple[tuple[Recess, ...], tuple[Bearing, ...]]:
     """All holes and pockets of a wedge, and what has to be left under heads and nuts."""
     reach = float(np.linalg.norm(np.ptp(shape.corners_mm, axis=0))) + BEYOND_MM
     found = [_camera_screw(wedge, shape, room_for(wedge.screw, catalogue), reach)]
@@ -90,10 +90,10 @@ def screw_cuts(
     return tuple(cut for cuts, _ in found for cut in cuts), tuple(ring for _, ring in found)
 
 
-def engraved(place: Engraving) -> Cut:
+def engraved(place: Engraving) -> Recess:
     """The cut that a name makes."""
     start = _moved(place.print_from_face, -ENGRAVED_MM)
-    return Cut(start, place.outlines_mm, ENGRAVED_MM + BEYOND_MM)
+    return Recess(start, place.outlines_mm, ENGRAVED_MM + BEYOND_MM)
 
 
 def _hole_frame(at_print_mm: Floats, axis_print: Floats) -> Floats:
@@ -128,13 +128,13 @@ def hexagon(across_flats_mm: float) -> Floats:
     return np.array([*corners, [half, -side]])
 
 
-def _round(frame: Floats, radius_mm: float, depth_mm: float) -> Cut:
-    return Cut(frame, (teardrop(radius_mm),), depth_mm, radius_mm)
+def _round(frame: Floats, radius_mm: float, depth_mm: float) -> Recess:
+    return Recess(frame, (teardrop(radius_mm),), depth_mm, radius_mm)
 
 
 def _camera_screw(
-    wedge: Wedge, shape: Shape, room: Room, reach_mm: float
-) -> tuple[list[Cut], Bearing]:
+    wedge: Wedge, shape: WedgeShape, room: Room, reach_mm: float
+) -> tuple[list[Recess], Bearing]:
     """The hole through the seat, and behind it the way for the screw's head and its key."""
     print_from_seat = shape.print_from_base @ wedge.base_from_seat
     frame = _hole_frame(print_from_seat[:3, 3], -print_from_seat[:3, 2])
@@ -146,8 +146,8 @@ def _camera_screw(
 
 
 def _base_hole(
-    hole: Hole, shape: Shape, catalogue: Catalogue, reach_mm: float
-) -> tuple[list[Cut], Bearing]:
+    hole: Hole, shape: WedgeShape, catalogue: Catalogue, reach_mm: float
+) -> tuple[list[Recess], Bearing]:
     """A hole through the base, and above it room for what ``hole.kind`` says.
 
     ``through``: a cap screw's head; ``countersunk``: a countersunk one; ``tapped``: a hexagon
@@ -163,13 +163,13 @@ def _base_hole(
     if hole.kind == "tapped":
         flats = room.across_flats_mm + NUT_CLEARANCE_MM
         # The nut lies as deep as a head would: its pocket is what keeps it from turning.
-        cuts.append(Cut(top, (hexagon(flats),), room.nut_height_mm + NUT_CLEARANCE_MM))
+        cuts.append(Recess(top, (hexagon(flats),), room.nut_height_mm + NUT_CLEARANCE_MM))
         head, outer = flats / np.sqrt(3.0), room.across_flats_mm / 2.0
         top = _moved(top, room.nut_height_mm)
     elif hole.kind == "countersunk":
         depth = head - radius
         share = (head + CLEARANCE_MM / 2.0) / radius
-        cuts.append(Cut(_moved(top, -depth), (teardrop(radius),), depth + 1e-3, None, share))
+        cuts.append(Recess(_moved(top, -depth), (teardrop(radius),), depth + 1e-3, None, share))
         outer = radius + 0.5
     cuts.append(_round(top, head + CLEARANCE_MM / 2.0, reach_mm))
     ring = Bearing(_moved(frame, BEYOND_MM), radius, outer, f"base screw {hole.label}".strip())

@@ -34,7 +34,7 @@ BED_MM = 0.01
 
 
 @dataclass(frozen=True, eq=False)
-class Shape:
+class WedgeShape:
     """``print_from_base`` (4, 4): z up from the bed. ``corners_mm`` (K, 3) in the print frame."""
 
     print_from_base: Floats
@@ -42,7 +42,7 @@ class Shape:
     volume_mm3: float
 
 
-def shapes_of(wedge: Wedge) -> list[Shape]:
+def shapes_of(wedge: Wedge) -> list[WedgeShape]:
     """The ways to print a wedge that need no support on the outside, the lightest first.
 
     :class:`InputError` when base and seat cannot be joined.
@@ -57,7 +57,7 @@ def shapes_of(wedge: Wedge) -> list[Shape]:
     return sorted(found, key=lambda shape: shape.volume_mm3)
 
 
-def _candidates(wedge: Wedge) -> Iterator[Shape]:
+def _candidates(wedge: Wedge) -> Iterator[WedgeShape]:
     """On each of the four sides of the base, as it is and with the seat let down to the bed."""
     corners = _corners(wedge)
     base = np.array([0.0, 0.0, 1.0])
@@ -72,7 +72,7 @@ def _candidates(wedge: Wedge) -> Iterator[Shape]:
             matrix = np.eye(4)
             matrix[:3, :3], matrix[2, 3] = axes, -bed
             vertices = solid.to_mesh64().vert_properties[:, :3] - [0.0, 0.0, bed]
-            yield Shape(matrix, vertices, solid.volume())
+            yield WedgeShape(matrix, vertices, solid.volume())
 
 
 def _corners(wedge: Wedge) -> Floats:
@@ -118,7 +118,7 @@ def facets(corners_mm: Floats) -> list[tuple[Floats, Floats]]:
     return out
 
 
-def _steepest_deg(shape: Shape) -> float:
+def _steepest_deg(shape: WedgeShape) -> float:
     """Overhang of the outer shape."""
     falls = [
         -normal[2] for normal, corners in facets(shape.corners_mm) if corners[:, 2].max() > BED_MM

@@ -17,14 +17,14 @@ from rig.build.wedges.engraving import (
 )
 from rig.build.wedges.recipe import (
     Bearing,
-    Cut,
+    Recess,
     PrintPart,
     engraved,
     screw_cuts,
 )
 from rig.build.wedges.shape import (
     BED_MM,
-    Shape,
+    WedgeShape,
     shapes_of,
 )
 from rig.catalogue.catalogue import Catalogue
@@ -59,7 +59,7 @@ def print_part(wedge: Wedge, catalogue: Catalogue) -> PrintPart:
     raise problems[0]
 
 
-def _printed(wedge: Wedge, shape: Shape, catalogue: Catalogue) -> PrintPart:
+def _printed(wedge: Wedge, shape: WedgeShape, catalogue: Catalogue) -> PrintPart:
     """The recipe of a wedge in one shape."""
     cuts, bearings = screw_cuts(wedge, shape, catalogue)
     solid = _carved(shape.corners_mm, cuts)
@@ -85,7 +85,7 @@ def _printed(wedge: Wedge, shape: Shape, catalogue: Catalogue) -> PrintPart:
     )
 
 
-def bracket_mesh(part: PrintPart) -> trimesh.Trimesh:
+def wedge_mesh(part: PrintPart) -> trimesh.Trimesh:
     """The watertight mesh of a wedge in its print frame, millimetres.
 
     :class:`InternalError` when it is not closed or would need support.
@@ -102,7 +102,7 @@ def bracket_mesh(part: PrintPart) -> trimesh.Trimesh:
     return mesh
 
 
-def _carved(corners_mm: Floats, cuts: tuple[Cut, ...]) -> Manifold:
+def _carved(corners_mm: Floats, cuts: tuple[Recess, ...]) -> Manifold:
     from manifold3d import Manifold, OpType
 
     body = Manifold.hull_points(np.ascontiguousarray(corners_mm))
@@ -115,7 +115,7 @@ def _cross_section(outlines: tuple[Floats, ...]) -> CrossSection:
     return CrossSection([np.ascontiguousarray(o) for o in outlines], FillRule.NonZero)
 
 
-def _cut_solid(cut: Cut) -> Manifold:
+def _cut_solid(cut: Recess) -> Manifold:
     from manifold3d import Manifold
 
     share = (cut.end_share, cut.end_share)

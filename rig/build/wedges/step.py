@@ -11,7 +11,7 @@ import numpy as np
 from geometry.arrays import Floats
 from common.errors import InputError
 from rig.build.wedges.recipe import (
-    Cut,
+    Recess,
     PrintPart,
 )
 from rig.build.wedges.shape import facets
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from build123d import Face, Part, Plane, Solid
 
 
-def bracket_step(part: PrintPart) -> bytes:
+def wedge_step(part: PrintPart) -> bytes:
     """The wedge as STEP, millimetres, in its print frame; round holes are true cylinders.
 
     :class:`InputError` when the extra ``cad`` is not installed.
@@ -55,7 +55,7 @@ def _body(part: PrintPart) -> Solid:
     return block
 
 
-def _plane(cut: Cut) -> Plane:
+def _plane(cut: Recess) -> Plane:
     import build123d as cad
 
     matrix = cut.print_from_cut
@@ -64,7 +64,7 @@ def _plane(cut: Cut) -> Plane:
     )
 
 
-def _cut_solid(cut: Cut) -> Part:
+def _cut_solid(cut: Recess) -> Part:
     import build123d as cad
 
     plane = _plane(cut)
@@ -78,7 +78,7 @@ def _cut_solid(cut: Cut) -> Part:
     return drill + cad.extrude(plane * cad.make_face(wire.edges()), cut.depth_mm, dir=plane.z_dir)
 
 
-def _extruded(plane: Plane, cut: Cut) -> Part:
+def _extruded(plane: Plane, cut: Recess) -> Part:
     """Any other outlines: those that run clockwise are solid letters' borders, or all of one."""
     import build123d as cad
 

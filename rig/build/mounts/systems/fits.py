@@ -37,7 +37,7 @@ from rig.build.mounts.structure import (
     Wedge,
 )
 from rig.build.mounts.systems.footing import (
-    Footing,
+    BaseFooting,
     clear_footing,
 )
 
@@ -61,7 +61,7 @@ CAMERA_HOLE_MM = 6.8
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class WedgeFit:
     """A wedge that can be printed, wherever its post stands.
 
     ``pose``: the camera's, or turned over; ``turned_deg``: how the post is turned on the plate;
@@ -74,7 +74,7 @@ class Fit:
     turned_deg: float
     angles_deg: Floats
     seat_mm: float
-    footing: Footing
+    footing: BaseFooting
     wedge: Wedge
     body_mm: Floats
 
@@ -87,7 +87,7 @@ class Fitter:
     profile: Profile
     catalogue: Catalogue
 
-    def fits(self, camera: RigCamera) -> Iterator[Fit]:
+    def fits(self, camera: RigCamera) -> Iterator[WedgeFit]:
         """The ways to hold a camera, the straightest first; at least one.
 
         :class:`InputError` where there is none, with the nearest direction that can be held.
@@ -95,7 +95,7 @@ class Fitter:
         refused: InputError | None = None
         count = 0
         for tried in self._tries(camera):
-            if isinstance(tried, Fit):
+            if isinstance(tried, WedgeFit):
                 count += 1
                 yield tried
             else:
@@ -105,7 +105,7 @@ class Fitter:
                 raise refused
             raise self._too_steep(camera, refused)
 
-    def _tries(self, camera: RigCamera) -> Iterator[Fit | InputError]:
+    def _tries(self, camera: RigCamera) -> Iterator[WedgeFit | InputError]:
         """Every turn of the post: the wedge, or why it cannot be printed.
 
         Screws behind the camera come first: its lens leaves more room there, and the post is
@@ -129,7 +129,7 @@ class Fitter:
 
     def _fit(
         self, camera: RigCamera, pose: Pose, turned_deg: float, base: Floats, ahead: bool
-    ) -> Fit:
+    ) -> WedgeFit:
         """The wedge on a post turned so far; ``base`` (3, 3) are the axes of its side."""
         profile, seat = self.profile, seat_height(camera, pose, base)
         axes = base.T @ pose.rotation_rig_to_camera.T @ PLATE_FROM_CAMERA.T
@@ -145,7 +145,7 @@ class Fitter:
         part = print_part(wedge, self.catalogue)
         body = carried(np.linalg.inv(wedge.rig_from_base) @ part.rig_from_print, part.corners_mm)
         angles = head_angles(pose.rotation_rig_to_camera, base)
-        return Fit(pose, turned_deg, angles, seat, footing, wedge, body)
+        return WedgeFit(pose, turned_deg, angles, seat, footing, wedge, body)
 
     def _too_steep(self, camera: RigCamera, refused: InputError | None) -> InputError:
         """Why no wedge holds a camera, and how far it would have to be turned for one."""
@@ -156,7 +156,7 @@ class Fitter:
         other = "choose a frame or an arc for it"
         for less in np.arange(NEARER_DEG, away, NEARER_DEG):
             nearer = camera.moved_to(_turned_in(camera.pose, normal, float(less)))
-            if any(isinstance(tried, Fit) for tried in self._tries(nearer)):
+            if any(isinstance(tried, WedgeFit) for tried in self._tries(nearer)):
                 other = f"turn it {less:.0f} degrees towards the plate's normal, or {other}"
                 break
         return InputError("wedge-steep", why, other)
@@ -189,7 +189,7 @@ def _wedge(
     camera: RigCamera,
     rig_from_base: Floats,
     base_from_seat: Floats,
-    footing: Footing,
+    footing: BaseFooting,
     profile: Profile,
 ) -> Wedge:
     """The wedge; its base holes lie over the post's two slots."""

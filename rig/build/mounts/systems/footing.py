@@ -33,7 +33,7 @@ SIDES = 24
 
 
 @dataclass(frozen=True)
-class Footing:
+class BaseFooting:
     """A base along a post, seen from the point under the camera's thread, y towards the front.
 
     It reaches from ``-rear_mm`` to ``front_mm``; ``rows_mm`` are the y of its two rows of screws,
@@ -64,7 +64,7 @@ def clear_footing(
     slot_mm: float,
     *,
     ahead: bool,
-) -> Footing:
+) -> BaseFooting:
     """The shortest base whose screws are free of ``blocks``, convex solids (N, 3) over it.
 
     ``seat_mm``: height of the seat; ``normal`` (3,): where it faces; ``screws``: the camera's and
@@ -78,8 +78,8 @@ def clear_footing(
     first = float(np.ceil(base - min(0.0, *ends)))
     second = first + PITCH_MM
     if ahead:
-        return Footing(second + EDGE_MM, SEAT_REACH_MM, (first, second), slot_mm)
-    return Footing(SEAT_REACH_MM, second + EDGE_MM, (-first, -second), slot_mm)
+        return BaseFooting(second + EDGE_MM, SEAT_REACH_MM, (first, second), slot_mm)
+    return BaseFooting(SEAT_REACH_MM, second + EDGE_MM, (-first, -second), slot_mm)
 
 
 def _screw_way(seat_mm: float, normal: Floats, radius_mm: float) -> Floats:

@@ -30,7 +30,7 @@ from rig.build.mounts.systems.heads import (
 )
 from rig.build.mounts.systems.outrigger import (
     FOOTINGS,
-    Footing,
+    HeadFooting,
     Hung,
     Outrigger,
 )
@@ -149,7 +149,7 @@ def _hang(
     rail: Rail,
     parts: Outrigger,
     step_mm: float,
-    stance: Stance[Footing],
+    stance: Stance[HeadFooting],
     side: int,
 ) -> Hung | None:
     """The outrigger at its exact settings; None when one of them is out of range."""

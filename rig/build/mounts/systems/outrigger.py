@@ -55,7 +55,7 @@ STUB_END_MM = 15.0
 
 
 @dataclass(frozen=True, eq=False)
-class Footing:
+class HeadFooting:
     """Where a head stands: the face of the arm, and how far its plate is pitched up."""
 
     name: str
@@ -68,7 +68,7 @@ class Footing:
 
 
 FOOTINGS = tuple(
-    Footing(name if pitch == 0.0 else f"{name} {pitch:+g} degree", face, pitch)
+    HeadFooting(name if pitch == 0.0 else f"{name} {pitch:+g} degree", face, pitch)
     for pitch in PITCHES_DEG
     for name, face in FACES
 )
@@ -102,7 +102,7 @@ class Outrigger:
         """Middle of the stub before the middle of the rail."""
         return (rail_depth_mm + self.profile.width_mm) / 2.0
 
-    def base(self, foot: Footing) -> Floats:
+    def base(self, foot: HeadFooting) -> Floats:
         """The head's foot (4, 4) from the front end of the arm's middle line."""
         _, length, thick = self.plate_mm
         joint = 0.0 if foot.pitch_deg == 0.0 else self.joint_mm
@@ -124,7 +124,7 @@ class Outrigger:
         return shift(np.array([0.0, self.profile.width_mm / 2.0, side * self.profile.height_mm]))
 
     def links(
-        self, rail_depth_mm: float, side: int, foot: Footing, camera: RigCamera
+        self, rail_depth_mm: float, side: int, foot: HeadFooting, camera: RigCamera
     ) -> tuple[Link, ...]:
         """From the rail's frame, where the stub's middle is at z = 0, to the camera."""
         return (
@@ -156,7 +156,7 @@ class Hung:
     rig_from_rail: Floats
     rail_size_mm: tuple[float, float]
     side: int
-    foot: Footing
+    foot: HeadFooting
     parts: Outrigger
 
     @property

@@ -50,7 +50,7 @@ from rig.build.mounts.systems.base import Built
 from rig.build.mounts.systems.fits import (
     CAMERA_SCREW,
     SCREW_HOLES_MM,
-    Fit,
+    WedgeFit,
     Fitter,
 )
 from rig.build.mounts.systems.posts import (
@@ -112,7 +112,7 @@ class PlateSystem:
         return PlateHolding(self, tuple(held), face, around)
 
     def _face(
-        self, cameras: tuple[RigCamera, ...], fits: list[Fit], around: Surroundings
+        self, cameras: tuple[RigCamera, ...], fits: list[WedgeFit], around: Surroundings
     ) -> Floats:
         """The plate's frame (4, 4), its origin straight behind the datum.
 
@@ -131,7 +131,7 @@ class PlateSystem:
         origin[1] = float(np.floor(min(behind, *ends) - SPARE_MM))
         return rotated(PLATE_AXES, origin)
 
-    def _best(self, camera: RigCamera, found: Iterable[Fit], face: Floats, site: Site) -> Posted:
+    def _best(self, camera: RigCamera, found: Iterable[WedgeFit], face: Floats, site: Site) -> Posted:
         """The first post and wedge without a clash, else the one with the fewest."""
         best: tuple[int, Posted] | None = None
         for fit in found:

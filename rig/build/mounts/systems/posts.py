@@ -33,7 +33,7 @@ from rig.build.mounts.structure import (
     Solid,
     Wedge,
 )
-from rig.build.mounts.systems.fits import Fit
+from rig.build.mounts.systems.fits import WedgeFit
 
 X, Y, Z = np.eye(3)
 LONGEST_POST_MM = 1500.0
@@ -49,7 +49,7 @@ class Posted:
     """
 
     mount: CameraMount
-    fit: Fit
+    fit: WedgeFit
     back_mm: float
     profile: Profile
 
@@ -104,7 +104,7 @@ class Posted:
         return ((self.post_id, self.wedge_id), (self.wedge_id, self.mount.name))
 
 
-def post_for(camera: RigCamera, fit: Fit, face: Floats, profile: Profile) -> Posted | None:
+def post_for(camera: RigCamera, fit: WedgeFit, face: Floats, profile: Profile) -> Posted | None:
     """A camera's post on the plate's frame ``face`` (4, 4); None where none is long enough."""
     values = dict(zip(ANGLES, (float(a) for a in fit.angles_deg), strict=True))
     values |= {"across": 0.0, "up": 0.0, "turn": fit.turned_deg, "post": 300.0}
@@ -122,7 +122,7 @@ def post_for(camera: RigCamera, fit: Fit, face: Floats, profile: Profile) -> Pos
 
 
 def _chain(
-    camera: RigCamera, fit: Fit, face: Floats, back_mm: float, profile: Profile
+    camera: RigCamera, fit: WedgeFit, face: Floats, back_mm: float, profile: Profile
 ) -> tuple[Link, ...]:
     """From the plate to the camera. ``back_mm``: the post's end to the camera's thread."""
     side = np.array([profile.width_mm / 2.0, 0.0, -back_mm])

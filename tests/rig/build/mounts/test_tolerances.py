@@ -13,7 +13,7 @@ from geometry.frames import Pose
 from rig.build.mounts.linear import LinearModel
 from rig.build.mounts.making import make_plan
 from rig.build.mounts.network import (
-    Network,
+    MountNetwork,
     relative_slack,
 )
 from rig.build.mounts.plan import MountPlan
@@ -90,7 +90,7 @@ def test_a_tolerance_ends_where_a_limit_breaks() -> None:
 
 
 def test_the_quick_rows_are_those_of_the_evaluation() -> None:
-    network = Network(face(), limits(), cameras())
+    network = MountNetwork(face(), limits(), cameras())
     whole = {row.name: row for row in evaluate(face(), cameras(), limits()).constraints}
     seen = 0
     for index, camera in enumerate(cameras()):

@@ -24,7 +24,7 @@ from rig.build.mounts.surroundings import (
 from rig.build.mounts.systemfile import parse_system
 from rig.build.mounts.systems.base import Built
 from rig.build.wedges import (
-    bracket_mesh,
+    wedge_mesh,
     overhang_deg,
     print_part,
 )
@@ -137,7 +137,7 @@ def test_wedges_that_lean_to_any_side_are_printed(seed: int) -> None:
     made = built((camera,))
     (wedge,) = made.structure.wedges
     part = print_part(wedge, CATALOGUE)
-    mesh = bracket_mesh(part)
+    mesh = wedge_mesh(part)
     assert mesh.is_watertight and mesh.body_count == 1
     assert overhang_deg(mesh) <= LIMIT_DEG
     check_keys(made)

@@ -22,10 +22,10 @@ from rig.build.mounts.structure import (
 )
 from rig.build.wedges import (
     PrintPart,
-    bracket_3mf,
-    bracket_mesh,
-    bracket_step,
-    bracket_stl,
+    wedge_3mf,
+    wedge_mesh,
+    wedge_step,
+    wedge_stl,
     overhang_deg,
     print_part,
     wedge_corners_mm,
@@ -53,7 +53,7 @@ def area_on_plane(mesh: trimesh.Trimesh, point: np.ndarray, normal: np.ndarray) 
 
 def check(wedge: Wedge) -> tuple[PrintPart, trimesh.Trimesh]:
     part = print_part(wedge, CATALOGUE)
-    mesh = bracket_mesh(part)
+    mesh = wedge_mesh(part)
     assert mesh.is_watertight and mesh.is_winding_consistent
     assert overhang_deg(mesh) <= LIMIT_DEG
     assert mesh.bounds[0][2] == pytest.approx(0.0, abs=1e-9)
@@ -100,7 +100,7 @@ def test_the_name_is_cut_in() -> None:
     wedge = wedge_of(AIMS[0], HERE)
     part = print_part(wedge, CATALOGUE)
     plain = replace(part, cuts=part.cuts[:-1])
-    removed = bracket_mesh(plain).volume - bracket_mesh(part).volume
+    removed = wedge_mesh(plain).volume - wedge_mesh(part).volume
     letters = words("left")
     # Borders of holes, as in an e, run the other way round: their areas count negative.
     area = sum(
@@ -138,7 +138,7 @@ def test_a_steep_seat_is_printed_so_that_its_screw_needs_no_support() -> None:
         "steep", "cam06", np.eye(4), seat, (40.0, 30.0), (40.0, 166.0), holes, "stud-1-4-20", 6.8
     )
     part = print_part(wedge, load_catalogue())
-    mesh = bracket_mesh(part)
+    mesh = wedge_mesh(part)
     assert mesh.is_watertight
     assert overhang_deg(mesh) <= 60.0
 
@@ -178,13 +178,13 @@ def test_the_body_lies_between_base_and_seat_in_the_rig() -> None:
 
 def test_files_are_in_millimetres_and_the_same_part() -> None:
     part = print_part(wedge_of(AIMS[1], HERE), CATALOGUE)
-    mesh = bracket_mesh(part)
-    stl = trimesh.load(io.BytesIO(bracket_stl(part)), file_type="stl")
-    three = trimesh.load(io.BytesIO(bracket_3mf(part)), file_type="3mf")
+    mesh = wedge_mesh(part)
+    stl = trimesh.load(io.BytesIO(wedge_stl(part)), file_type="stl")
+    three = trimesh.load(io.BytesIO(wedge_3mf(part)), file_type="3mf")
     # STL keeps single precision: 1e-7 of 72 mm a coordinate.
     assert stl.is_watertight and stl.volume == pytest.approx(mesh.volume, rel=1e-5)
     assert np.allclose(three.bounds, mesh.bounds, atol=1e-3)
-    model = zipfile.ZipFile(io.BytesIO(bracket_3mf(part))).read("3D/3dmodel.model")
+    model = zipfile.ZipFile(io.BytesIO(wedge_3mf(part))).read("3D/3dmodel.model")
     assert b'unit="millimeter"' in model and b'name="wedge-right"' in model
 
 
@@ -212,10 +212,10 @@ def test_step_is_the_same_solid_or_says_how_to_get_it(tmp_path: Path) -> None:
         import build123d
     except ImportError:
         with pytest.raises(InputError, match=r"pip install rigwright\[cad\]"):
-            bracket_step(part)
+            wedge_step(part)
         return
     path = tmp_path / "wedge.step"
-    path.write_bytes(bracket_step(part))
+    path.write_bytes(wedge_step(part))
     solid = build123d.import_step(str(path))
     # Holes are true cylinders here and 64-sided in the mesh: 0.2 % of what the holes take away.
-    assert solid.volume == pytest.approx(bracket_mesh(part).volume, rel=5e-4)
+    assert solid.volume == pytest.approx(wedge_mesh(part).volume, rel=5e-4)
