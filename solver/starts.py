@@ -42,7 +42,7 @@ def fitting_distance(
     """Smallest distance at which all points are in frame and can be in focus.
 
     The camera looks at ``target_mm``, or the centroid, from that far along ``forward`` (3,).
-    Within the stand-off limits.
+    Within the stand-off limits, unless the frame alone asks for more.
     """
     rotation = look_at_rotation(np.zeros(3), forward, roll_deg)
     middle = points_mm.mean(axis=0) if target_mm is None else target_mm
