@@ -2,26 +2,69 @@
 
 from __future__ import annotations
 
-import secrets
 import shutil
-from collections.abc import Collection, Iterator
-from contextlib import contextmanager
+import tempfile
+from collections.abc import Collection, Iterable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from common.errors import ConflictError, InputError
+from common.files.ownership import foreign, mark
+
+_ANOTHER = "give another --out, or move it away yourself"
+
+
+@contextmanager
+def new_folder(
+    out: Path, *, force: bool, spare: Iterable[Path] = (), renewed: Collection[Path] = ()
+) -> Iterator[Path]:
+    """An empty folder that becomes ``out`` when all went well, and disappears when not.
+
+    What is in it then is listed in the folder (:mod:`common.files.ownership`). With ``force`` a
+    folder that holds files is replaced, but only where all of them are such results, unchanged:
+    files ``renewed`` may have been changed. Raises :class:`ConflictError` for any other folder
+    that is not empty, for links, and where ``out`` holds one of the files and folders to
+    ``spare``, which would be lost; :class:`InputError` where nothing can be written.
+    """
+    _refuse_place(out)
+    if _holds_something(out):
+        if not force:
+            raise ConflictError(
+                "out-not-empty",
+                f"the folder {out} is not empty",
+                "give another --out, or --force to replace results that are in it",
+            )
+        _refuse_foreign(out, out, renewed)
+    _refuse_loss(out, spare)
+    made = [parent for parent in out.parents if not parent.exists()]
+    partial = _beside(out)
+    try:
+        (partial / "files").mkdir()
+        yield partial / "files"
+        mark(partial / "files")
+        _put_in_place(partial, out, renewed)
+    finally:
+        shutil.rmtree(partial, ignore_errors=True)
+        if not out.exists():
+            for parent in made:
+                with suppress(OSError):
+                    parent.rmdir()
 
 
 @contextmanager
 def whole_folder(out: Path) -> Iterator[Path]:
     """An empty folder that becomes ``out`` when all went well, and disappears when not.
 
-    What was in ``out`` is replaced then. Raises :class:`InputError` where it cannot be written.
+    What was in ``out`` is replaced then: whoever calls made sure (:func:`refuse_others`) that it
+    may be. Raises :class:`InputError` where it cannot be written.
     """
-    half = out.parent / f".{out.name}.{secrets.token_hex(4)}.part"
+    partial = _beside(out)
     try:
-        half.mkdir(parents=True)
-        yield half
-        _put_in_place(half, out)
+        (partial / "files").mkdir()
+        yield partial / "files"
+        if _holds_something(out):
+            out.rename(partial / "old")
+        _rename_new(partial, out)
     except OSError as error:
         raise InputError(
             "out-unwritable",
@@ -29,11 +72,13 @@ def whole_folder(out: Path) -> Iterator[Path]:
             "choose another --out folder",
         ) from error
     finally:
-        shutil.rmtree(half, ignore_errors=True)
+        shutil.rmtree(partial, ignore_errors=True)
 
 
 def refuse_others(out: Path, own: Collection[str]) -> None:
     """Raise :class:`ConflictError` where ``out`` is no folder, or holds files but ``own``."""
+    if out.is_symlink():
+        raise ConflictError("out-not-a-folder", f"{out} is a link", "choose another place")
     if out.is_dir():
         held = (p for p in out.rglob("*") if p.is_symlink() or not p.is_dir())
         others = sorted({p.relative_to(out).as_posix() for p in held} - set(own))
@@ -43,19 +88,89 @@ def refuse_others(out: Path, own: Collection[str]) -> None:
                 f"the folder {out} holds other files ({others[0]})",
                 "choose an empty or new folder",
             )
-    elif out.exists() or out.is_symlink():
+    elif out.exists():
         raise ConflictError("out-not-a-folder", f"{out} is not a folder", "choose another place")
 
 
-def _put_in_place(half: Path, out: Path) -> None:
-    """Rename ``half`` to ``out``; what was there steps aside first and goes last."""
-    former = half.with_suffix(".old")
-    if out.exists():
-        out.rename(former)
+def _refuse_place(out: Path) -> None:
+    """Refuse what is no folder of its own: links, files, and where the user stands."""
+    if out.is_symlink():
+        raise ConflictError("out-not-a-folder", f"{out} is a link", "give another --out")
+    if out.exists() and not out.is_dir():
+        raise InputError("out-not-a-folder", f"{out} is a file", "give another --out")
+    if out.exists() and Path.cwd().is_relative_to(out.resolve()):
+        raise ConflictError(
+            "out-here", f"{out} is the folder you are in, or above it", "name a new folder"
+        )
+
+
+def _refuse_foreign(held: Path, out: Path, renewed: Collection[Path]) -> None:
+    """Refuse to replace ``out``, whose content is at ``held`` now, where it is not all ours."""
+    reason = foreign(held, [held / path.relative_to(out) for path in renewed])
+    if reason is not None:
+        raise ConflictError("out-not-ours", f"the folder {out} {reason}", _ANOTHER)
+    if not held.stat().st_mode & 0o200:
+        raise ConflictError("out-not-ours", f"the folder {out} is write-protected", _ANOTHER)
+
+
+def _refuse_loss(out: Path, spare: Iterable[Path]) -> None:
+    for path in spare:
+        if path.exists() and path.resolve().is_relative_to(out.resolve()):
+            raise ConflictError(
+                "out-holds-input",
+                f"the folder {out} holds {path}, which would be lost",
+                "give another --out",
+            )
+
+
+def _holds_something(out: Path) -> bool:
     try:
-        half.rename(out)
+        return out.is_dir() and any(out.iterdir())
+    except OSError as error:
+        raise InputError(
+            "out-not-readable", f"cannot look into {out} ({error.strerror})", "give another --out"
+        ) from error
+
+
+def _beside(out: Path) -> Path:
+    """A new folder in the folder that ``out`` is to stand in."""
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        return Path(tempfile.mkdtemp(prefix=f".{out.name}-", dir=out.parent))
+    except OSError as error:
+        raise InputError(
+            "out-unwritable",
+            f"cannot write into {out.parent} ({error.strerror})",
+            "give another --out",
+        ) from error
+
+
+def _put_in_place(partial: Path, out: Path, renewed: Collection[Path]) -> None:
+    """Rename the new folder to ``out``; what was there steps aside first and is removed last."""
+    old = partial / "old"
+    try:
+        if _holds_something(out):
+            out.rename(old)
+            # Looked at again now that nobody else knows where it is: it was in plain view for long.
+            _refuse_foreign(old, out, renewed)
+        _rename_new(partial, out)
+    except OSError as error:
+        raise InputError(
+            "out-unwritable",
+            f"cannot write to {out} ({(error.strerror or 'unwritable').lower()})",
+            "give another --out",
+        ) from error
+    finally:
+        if old.exists() and not out.exists():
+            old.rename(out)
+
+
+def _rename_new(partial: Path, out: Path) -> None:
+    """A rename onto a folder that is empty replaces it; onto any other it fails."""
+    old = partial / "old"
+    try:
+        (partial / "files").rename(out)
     except OSError:
-        if former.exists():
-            former.rename(out)
+        if old.exists() and not out.exists():
+            old.rename(out)
         raise
-    shutil.rmtree(former, ignore_errors=True)

@@ -11,7 +11,7 @@ from typing import Any
 
 from common.files.folders import refuse_others, whole_folder
 from geometry.preparation import PreparedSubject
-from rig.design.designfile import design_document
+from rig.design.designfile import SCHEMA, design_document
 from rig.design.layout import Layout
 from rig.design.layoutfile import layout_csv, layout_document
 from rig.report import render_report
@@ -109,8 +109,8 @@ def write_design_folder(
     """Write all files of a design to the folder ``out``; returns their paths by name.
 
     The files are written to a folder beside it that is then renamed, so ``out`` never holds
-    half a design. A former design in ``out`` is replaced; a folder that holds anything else is
-    a :class:`ConflictError`, because it would be lost.
+    half a design. A former design in ``out`` is replaced; a folder that holds anything else, or
+    files of these names without a design, is a :class:`ConflictError`: they would be lost.
     """
     check_design_folder(out)
     makers = design_files(design, layout, prepared, spec, scan_name)
@@ -122,4 +122,12 @@ def write_design_folder(
 
 def check_design_folder(out: Path) -> None:
     """Raise when a design cannot be written to ``out``; call it before a long solve."""
-    refuse_others(out, FILE_NAMES)
+    refuse_others(out, FILE_NAMES if _holds_design(out) else ())
+
+
+def _holds_design(out: Path) -> bool:
+    try:
+        document = json.loads((out / "design.json").read_text(encoding="utf-8"))
+        return bool(document["schema"] == SCHEMA)
+    except (OSError, ValueError, KeyError, TypeError):
+        return False

@@ -32,7 +32,9 @@ OutOption = Annotated[
 JsonOption = Annotated[
     bool, typer.Option("--json", help="Print one JSON document instead of tables.")
 ]
-ForceOption = Annotated[bool, typer.Option("--force", help="Replace what is in the folder.")]
+ForceOption = Annotated[
+    bool, typer.Option("--force", help="Replace former results in the folder; never other files.")
+]
 WorkersOption = Annotated[
     int | None,
     typer.Option(

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from common.errors import InputError
+from common.files.ownership import files_of
 from service.cli.output import print_json
 
 JSON = dict[str, Any]
@@ -48,7 +49,7 @@ def reference_file(given: Path) -> Path:
 
 def show_measured(what: str, result: JSON, out: Path, *, as_json: bool) -> None:
     """A result as JSON or as tables, and its files."""
-    files = {path.name: path for path in sorted(out.iterdir())}
+    files = files_of(out)
     if as_json:
         print_json({"result": result, "files": {name: str(path) for name, path in files.items()}})
         return

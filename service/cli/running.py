@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import logging
 import os
-import shutil
 import signal
 import sys
-import tempfile
 import threading
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
 from typing import Any
 
 import typer
 
-from common.errors import ConflictError, InputError, InternalError, RigwrightError
+from common.errors import InputError, InternalError, RigwrightError
 from service.cli.progress import show_progress
 from service.jobs.engine import JobKind, Task
 from service.jobs.process import ProcessEngine
@@ -95,63 +93,3 @@ def cancel_on_signal() -> Iterator[threading.Event]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
-
-
-@contextmanager
-def new_folder(out: Path, *, force: bool, spare: Iterable[Path] = ()) -> Iterator[Path]:
-    """An empty folder that becomes ``out`` when all went well, and disappears when not.
-
-    Raises :class:`ConflictError` when ``out`` holds something and ``force`` is not given, or
-    one of the files and folders to ``spare``, which would be lost.
-    """
-    if out.exists() and not out.is_dir():
-        raise InputError("out-not-a-folder", f"{out} is a file", "give another --out")
-    if out.exists() and any(out.iterdir()) and not force:
-        raise ConflictError(
-            "out-not-empty",
-            f"the folder {out} is not empty",
-            "give another --out, or --force to replace it",
-        )
-    for path in spare:
-        if path.exists() and path.resolve().is_relative_to(out.resolve()):
-            raise ConflictError(
-                "out-holds-input",
-                f"the folder {out} holds {path}, which would be lost",
-                "give another --out",
-            )
-    made = _missing_parents(out)
-    try:
-        out.parent.mkdir(parents=True, exist_ok=True)
-        partial = Path(tempfile.mkdtemp(prefix=f".{out.name}-", dir=out.parent))
-    except OSError as error:
-        raise InputError(
-            "out-not-writable",
-            f"cannot write into {out.parent} ({error.strerror})",
-            "give another --out",
-        ) from error
-    try:
-        (partial / "files").mkdir()
-        yield partial / "files"
-        _put_in_place(partial, out)
-    finally:
-        shutil.rmtree(partial, ignore_errors=True)
-        if not out.exists():
-            for parent in made:
-                with suppress(OSError):
-                    parent.rmdir()
-
-
-def _missing_parents(out: Path) -> list[Path]:
-    return [parent for parent in out.parents if not parent.exists()]
-
-
-def _put_in_place(partial: Path, out: Path) -> None:
-    old = partial / "old"
-    if out.exists():
-        out.rename(old)
-    try:
-        (partial / "files").rename(out)
-    except OSError:
-        if old.exists():
-            old.rename(out)
-        raise

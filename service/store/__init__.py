@@ -25,6 +25,10 @@ from service.store.scans import Scans
 from service.store.tables import identity, utc_now
 from service.wire import error_fields
 
+DATABASE_NAME = "rigwright.sqlite3"
+_BEFORE_THE_DATABASE = {"lock", "lost+found"}
+"""A start that was cut short left a lock; a disk of its own has a folder for what is found."""
+
 
 def interrupted() -> InternalError:
     """Why a job ended that ran when the service stopped."""
@@ -46,6 +50,7 @@ class Store:
         self.folder = folder
         try:
             folder.mkdir(parents=True, exist_ok=True)
+            _refuse_foreign(folder)
             self._lock = FolderLock(folder)
         except OSError as error:
             raise InputError(
@@ -53,7 +58,7 @@ class Store:
                 f"the data folder {folder} cannot be used ({error.strerror})",
                 "give a folder you may write to with --data",
             ) from error
-        self.database = Database(folder / "rigwright.sqlite3")
+        self.database = Database(folder / DATABASE_NAME)
         try:
             self.database.write(_migrate)
         except (CommandError, DatabaseError) as error:
@@ -94,6 +99,17 @@ class Store:
         self.database.write(idempotency.forget_stale)
         self.jobs.interrupt_running(error_fields(interrupted()), but=settled_elsewhere)
         self.files.sweep(self.database.read(known_files))
+
+
+def _refuse_foreign(folder: Path) -> None:
+    """Keep away from folders with anybody's files: some names below are emptied at each start."""
+    names = {path.name for path in folder.iterdir()} - _BEFORE_THE_DATABASE
+    if names and not (folder / DATABASE_NAME).is_file():
+        raise InputError(
+            "data-folder",
+            f"the folder {folder} holds other files ({min(names)}), and no data of this program",
+            "give a new folder with --data",
+        )
 
 
 def _migrate(connection: Connection) -> None:

@@ -405,7 +405,7 @@ def test_requests_that_contradict_themselves_over_http(
 
 
 def test_the_folder_with_the_pictures_is_not_replaced(folder: Path) -> None:
-    from service.cli.running import new_folder
+    from common.files.folders import new_folder
 
     with (
         pytest.raises(ConflictError, match="would be lost; give another --out"),

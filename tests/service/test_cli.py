@@ -17,7 +17,9 @@ import typer
 from service_helpers import HERE, RIGWRIGHT, files_under, rigwright, wait_for
 
 from common.errors import CancelledError, ConflictError, InputError
-from service.cli.running import new_folder, one_line_errors, run_task
+from common.files.folders import new_folder
+from common.files.ownership import files_of
+from service.cli.running import one_line_errors, run_task
 
 
 def cpu_s(*command: str) -> float:
@@ -126,7 +128,7 @@ class TestNewFolder:
         with new_folder(out, force=False) as folder:
             (folder / "design.json").write_text("{}")
             assert not out.exists()
-        assert [path.name for path in out.iterdir()] == ["design.json"]
+        assert list(files_of(out)) == ["design.json"]
         assert [path.name for path in out.parent.iterdir()] == ["out"]
 
     def test_after_a_failure_all_is_as_before(self, tmp_path: Path) -> None:
@@ -138,8 +140,8 @@ class TestNewFolder:
 
     def test_what_is_there_is_replaced_only_by_force(self, tmp_path: Path) -> None:
         out = tmp_path / "out"
-        out.mkdir()
-        (out / "old.json").write_text("old")
+        with new_folder(out, force=False) as folder:
+            (folder / "old.json").write_text("old")
         with pytest.raises(ConflictError, match="--force"), new_folder(out, force=False):
             raise AssertionError
         with pytest.raises(ZeroDivisionError), new_folder(out, force=True):
@@ -147,7 +149,7 @@ class TestNewFolder:
         assert (out / "old.json").read_text() == "old"
         with new_folder(out, force=True) as folder:
             (folder / "new.json").write_text("new")
-        assert [path.name for path in out.iterdir()] == ["new.json"]
+        assert list(files_of(out)) == ["new.json"]
         assert [path.name for path in tmp_path.iterdir()] == ["out"]
 
     def test_an_empty_folder_may_be_used(self, tmp_path: Path) -> None:
@@ -178,7 +180,8 @@ def test_progress_is_plain_lines_without_a_terminal(
 COUNTING = (
     f"import sys; sys.path.insert(0, {str(HERE)!r})\n"
     "from pathlib import Path\n"
-    "from service.cli.running import new_folder, one_line_errors, run_task\n"
+    "from common.files.folders import new_folder\n"
+    "from service.cli.running import one_line_errors, run_task\n"
     "import typer\n"
     "def main(out: Path) -> None:\n"
     "    with one_line_errors(), new_folder(out, force=False) as folder:\n"

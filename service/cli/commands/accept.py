@@ -83,9 +83,10 @@ def run_accept_command(
     force: bool,
 ) -> None:
     """Test, write the certificate into ``out``; the exit code tells whether it was passed."""
+    from common.files.folders import new_folder
     from service.cli.output import NOT_WELL
     from service.cli.pictures import asked, given, reference_file, show_measured
-    from service.cli.running import new_folder, one_line_errors, run_task
+    from service.cli.running import one_line_errors, run_task
 
     with one_line_errors():
         request, inputs = asked(pictures, captures, options.workers)

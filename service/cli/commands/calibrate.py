@@ -91,8 +91,9 @@ def run_calibrate_command(
     force: bool,
 ) -> None:
     """Calibrate and write into ``out``, with a copy of the target set for later checks."""
+    from common.files.folders import new_folder
     from service.cli.pictures import TARGETS, asked, given, show_measured
-    from service.cli.running import new_folder, one_line_errors, run_task
+    from service.cli.running import one_line_errors, run_task
 
     with one_line_errors():
         request, inputs = asked(pictures, captures, options.workers)

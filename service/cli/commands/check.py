@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -63,6 +62,9 @@ def check(
     run_check_command(pictures, capture, out, options, as_json=as_json, force=force)
 
 
+HISTORY_PAGE = "history.html"
+
+
 @dataclass(frozen=True)
 class Checking:
     """What to check against, and what matters."""
@@ -85,9 +87,10 @@ def run_check_command(
     force: bool,
 ) -> None:
     """Check, write into ``out``, and end with an exit code that scripts can go by."""
+    from common.files.folders import new_folder
     from service.cli.output import NOT_WELL
     from service.cli.pictures import asked, given, reference_file, show_measured
-    from service.cli.running import new_folder, one_line_errors, run_task
+    from service.cli.running import one_line_errors, run_task
 
     with one_line_errors():
         request, inputs = asked(pictures, captures, options.workers)
@@ -128,22 +131,44 @@ def _earlier(history: Path | None) -> dict[str, Path]:
         return {}
     if not history.is_dir():
         raise InputError("history-folder", f"{history} is a file", "give a folder as --history")
+    _refuse_foreign_page(history / HISTORY_PAGE)
     found = sorted(history.glob("check-*.json"))
     return {f"check-{number}": path for number, path in enumerate(found)}
 
 
+def _refuse_foreign_page(page: Path) -> None:
+    """The page of the history is written anew by each check: only over one of ours."""
+    from common.errors import ConflictError
+
+    if page.is_symlink() or (page.exists() and not _is_ours(page)):
+        raise ConflictError(
+            "history-page",
+            f"{page} was not written by this program",
+            "give another folder as --history, or move it away",
+        )
+
+
+def _is_ours(page: Path) -> bool:
+    if not page.is_file():
+        return False
+    with page.open("rb") as file:
+        return b'name="generator" content="Rigwright"' in file.read(4096)
+
+
 def _add_to_history(out: Path, history: Path, made_utc: str) -> None:
+    from common.files.writing import write_whole
+
     history.mkdir(parents=True, exist_ok=True)
     stamp = "".join(letter for letter in made_utc if letter.isdigit())[:14]
-    shutil.copyfile(out / "check.json", _free(history, f"check-{stamp}"))
-    page = out / "history.html"
+    write_whole(_free(history, f"check-{stamp}"), (out / "check.json").read_bytes())
+    page = out / HISTORY_PAGE
     if page.exists():
-        shutil.copyfile(page, history / page.name)
+        write_whole(history / HISTORY_PAGE, page.read_bytes(), overwrite=True)
 
 
 def _free(folder: Path, stem: str) -> Path:
     """A name for one more file: checks of one second must not replace one another."""
     path, number = folder / f"{stem}.json", 2
-    while path.exists():
+    while path.exists() or path.is_symlink():
         path, number = folder / f"{stem}-{number}.json", number + 1
     return path

@@ -92,14 +92,15 @@ def run_design(
     entry: str, request: JSON, inputs: dict[str, Path], out: Path, *, as_json: bool, force: bool
 ) -> None:
     """Run the work and show what came of it."""
-    from service.cli.running import new_folder, one_line_errors, run_task
+    from common.files.folders import new_folder
+    from common.files.ownership import files_of
+    from service.cli.running import one_line_errors, run_task
     from service.problems import EXIT_INFEASIBLE
 
     with one_line_errors():
         with new_folder(out, force=force, spare=inputs.values()) as folder:
             result = run_task(entry, request, inputs, folder)
-        files = {path.name: path for path in sorted(out.iterdir())}
-        _show(result, files, as_json=as_json)
+        _show(result, files_of(out), as_json=as_json)
     if not result["feasible"]:
         raise typer.Exit(EXIT_INFEASIBLE)
 

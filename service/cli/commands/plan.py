@@ -44,7 +44,9 @@ def plan(
     as_json: Annotated[
         bool, typer.Option("--json", help="Print one JSON document instead of tables.")
     ] = False,
-    force: Annotated[bool, typer.Option("--force", help="Replace what is in the folder.")] = False,
+    force: Annotated[
+        bool, typer.Option("--force", help="Replace a former plan in the folder.")
+    ] = False,
 ) -> None:
     """Plan what holds the cameras: parts to cut, drill and print, settings, drawings, steps.
 
@@ -84,7 +86,8 @@ def run_plan_command(
 ) -> None:
     """Plan and write into ``out``."""
     from common.errors import InputError
-    from service.cli.running import new_folder, one_line_errors, run_task
+    from common.files.folders import new_folder
+    from service.cli.running import one_line_errors, run_task
     from service.problems import EXIT_INFEASIBLE
 
     with one_line_errors():
@@ -125,9 +128,10 @@ def _why(result: JSON) -> str:
 
 
 def _show(result: JSON, out: Path, *, as_json: bool) -> None:
+    from common.files.ownership import files_of
     from service.cli.output import print_json
 
-    files = {p.relative_to(out).as_posix(): p for p in sorted(out.rglob("*")) if p.is_file()}
+    files = files_of(out)
     if as_json:
         print_json({"result": result, "files": {name: str(path) for name, path in files.items()}})
         return

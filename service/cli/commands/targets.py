@@ -52,7 +52,8 @@ def run_targets_command(
 ) -> None:
     """Print a set, or propose one for a rig and print that."""
     from common.errors import InputError
-    from service.cli.running import new_folder, one_line_errors, run_task
+    from common.files.folders import new_folder
+    from service.cli.running import one_line_errors, run_task
 
     with one_line_errors():
         given = {"targets": target_set, "design": design}
@@ -64,16 +65,18 @@ def run_targets_command(
                 "for example: rigwright targets --design rig/design.json --out targets",
             )
         # A set that was printed before is printed anew, with its ruler measured: it is kept.
-        spare = [path for path in inputs.values() if path != out / "targets.toml"]
-        with new_folder(out, force=force, spare=spare) as folder:
+        renewed = [path for path in inputs.values() if path == out / "targets.toml"]
+        spare = [path for path in inputs.values() if path not in renewed]
+        with new_folder(out, force=force, spare=spare, renewed=renewed) as folder:
             result = run_task("service.tasks.targeting:targets", {"page": page}, inputs, folder)
         _show(result, out, as_json=as_json)
 
 
 def _show(result: JSON, out: Path, *, as_json: bool) -> None:
+    from common.files.ownership import files_of
     from service.cli.output import print_json
 
-    files = {path.name: path for path in sorted(out.iterdir())}
+    files = files_of(out)
     if as_json:
         print_json({"result": result, "files": {name: str(path) for name, path in files.items()}})
         return
