@@ -89,8 +89,8 @@ def look(folder: Path, told: set[str], tally: Tally) -> None:
         return
     with Session.open(folder) as session:
         recovery = session.recovery
-        there = {record.capture_id for record in session.books.records}
-        states = {record.state for record in session.books.records}
+        there = {record.capture_id for record in session.index.records}
+        states = {record.state for record in session.index.records}
         spent = {entry.capture_id for entry in session.manifest.interrupted}
     check = verify_session(folder)
     if not check.whole:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -100,13 +101,14 @@ class SimulatedCamera:
     @property
     def capabilities(self) -> CameraCapabilities:
         """What it can do."""
+        limit_s = self._simulation.render_limit_s
         return CameraCapabilities(
             TriggerKind(self._simulation.trigger),
             TimestampKind.DEVICE,
             frame_counter=True,
             frame_counter_modulus=self._simulation.counter_modulus,
             settable=SETTABLE,
-            wait_overrun_s=self._simulation.render_limit_s,
+            wait_overrun_s=math.inf if limit_s is None else limit_s,
         )
 
     def configure(self, settings: CameraSettings) -> CameraSettings:

@@ -57,11 +57,18 @@ class Coming:
         """When it arrives, on the host's clock."""
         return self.frame.arrived_host_ns
 
-    def rendered(self, limit_s: float) -> Image:
+    def rendered(self, limit_s: float | None) -> Image:
         """The picture. Raises :class:`DeviceError` when it cannot be had."""
         try:
             return self.picture.result(timeout=limit_s)
-        except (TimeoutError, BrokenProcessPool, CancelledError) as error:
+        except TimeoutError as error:
+            raise DeviceError(
+                "camera-gone",
+                f"the picture of simulated camera {self.frame.camera_id} was not rendered within "
+                f"{limit_s:g} s",
+                "raise render_limit_s in [simulation], or leave it out",
+            ) from error
+        except (BrokenProcessPool, CancelledError) as error:
             raise DeviceError(
                 "camera-gone",
                 f"the picture of simulated camera {self.frame.camera_id} was not rendered "
@@ -69,7 +76,7 @@ class Coming:
                 "start again, with fewer workers if memory is short",
             ) from error
 
-    def developed(self, limit_s: float) -> Frame:
+    def developed(self, limit_s: float | None) -> Frame:
         """The frame with its picture, and with what happened to it on its way."""
         pixels, status = self.rendered(limit_s), self.frame.status
         height, width = pixels.shape[:2]

@@ -182,7 +182,9 @@ class SimulationSettings:
     or ``software``. ``readout_ms`` passes from the end of an exposure to the frame's arrival.
     ``faults`` by camera name; ``"*"`` is for all that are not named. The cameras' clocks begin at
     random and run at random up to ``clock_drift_ppm`` fast or slow; their frame counters stand at
-    ``counter_start`` and begin again after ``counter_modulus`` values.
+    ``counter_start`` and begin again after ``counter_modulus`` values. ``render_limit_s`` gives a
+    picture up that is not rendered by then; None never does, because a simulated camera is not
+    late for the computer's being busy.
     """
 
     scene: SceneSettings = field(default_factory=SceneSettings)
@@ -199,7 +201,7 @@ class SimulationSettings:
     counter_modulus: int = 65536
     counter_start: int = 0
     seed: int = 0
-    render_limit_s: float = 120.0
+    render_limit_s: float | None = None
 
     def __post_init__(self) -> None:
         require_range("exposure_us", self.exposure_us, 1.0, 1e7)
@@ -209,7 +211,8 @@ class SimulationSettings:
         require_range("counter_modulus", self.counter_modulus, 2, 2**63)
         require_range("counter_start", self.counter_start, 0, self.counter_modulus - 1)
         require_range("seed", self.seed, 0, 2**63)
-        require_range("render_limit_s", self.render_limit_s, 1.0, 1e5)
+        if self.render_limit_s is not None:
+            require_range("render_limit_s", self.render_limit_s, 1.0, 1e5)
         require_range("workers", self.workers or 0, 0, 1024)
         for name, value, known in (
             ("pixel_format", self.pixel_format, PIXEL_FORMATS),

@@ -213,6 +213,16 @@ class CameraScript:
     unplugged: bool = False
     raw_too: bool = False
     encoded: bytes | None = None
+    refuses: frozenset[int] = frozenset()
+    """Commands that raise, without a picture."""
+    refuses_after: frozenset[int] = frozenset()
+    """Commands that are carried out and raise."""
+    dies_at: int | None = None
+    """The command at which it goes for good."""
+    hangs_at: int | None = None
+    """The command from which nothing returns for a while."""
+    empty: frozenset[int] = frozenset()
+    """Shots of which the transport lost everything but the stamps."""
 
 
 class MemoryCamera:
@@ -282,7 +292,17 @@ class MemoryCamera:
 
     def software_trigger(self) -> None:
         self._commands += 1
-        self.edge("command", self._commands, time.monotonic_ns())
+        shot, script = self._commands, self.script
+        if shot == script.hangs_at:
+            time.sleep(3.0)
+        if shot == script.dies_at:
+            self.gone = True
+            raise DeviceError("camera-gone", "its process ended", "plug it in")
+        if shot in script.refuses:
+            raise DeviceError("camera-error", "it could not focus", "see to it")
+        self.edge("command", shot, time.monotonic_ns())
+        if shot in script.refuses_after:
+            raise DeviceError("camera-error", "no answer to 'trigger'", "see to it")
 
     def _expose(self, capture: str, shot: int, at_host_ns: int) -> None:
         script = self.script
@@ -310,6 +330,8 @@ class MemoryCamera:
             exposure_us=self.settings.exposure_us,
             metadata={"truth": f"{capture}/{shot}"},
         )
+        if shot in script.empty:
+            frame = replace(frame, pixels=None, status=FrameStatus.INCOMPLETE)
         copies = 2 if shot in script.duplicate else 1
         with self._lock:
             self._frames += [frame] * copies

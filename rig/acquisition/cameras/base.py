@@ -134,6 +134,11 @@ class Frame:
     exposure_us: float | None = None
     metadata: Mapping[str, str] = field(default_factory=dict)
 
+    @property
+    def has_picture(self) -> bool:
+        """Whether there is anything to file: the transport may have lost all of it."""
+        return self.pixels is not None or bool(self.encoded)
+
 
 @dataclass(frozen=True)
 class CameraHealth:

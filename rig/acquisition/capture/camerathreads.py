@@ -7,7 +7,7 @@ import queue
 import threading
 import time
 from collections.abc import Callable, Iterable, Mapping
-from concurrent.futures import Future
+from concurrent.futures import Future, wait
 from concurrent.futures import TimeoutError as FutureTimeout
 from typing import TypeVar
 
@@ -16,6 +16,8 @@ from rig.acquisition.cameras.base import CameraDevice, CameraHealth
 from rig.acquisition.station.spec import CameraPlan
 
 T = TypeVar("T")
+LOOK_S = 0.1
+"""How often somebody who waits looks whether to stop."""
 
 
 class CameraThread:
@@ -72,18 +74,23 @@ def _put_away(device: CameraDevice) -> None:
 
 
 def outcomes(
-    futures: Mapping[str, Future[T]], timeout_s: float
+    futures: Mapping[str, Future[T]],
+    timeout_s: float,
+    stop: Callable[[], bool] = lambda: False,
 ) -> tuple[dict[str, T], dict[str, str]]:
     """Results, and a sentence for each camera without, by name; waits ``timeout_s`` in all.
 
-    Jobs are never taken back: a disarm that waits behind a hanging arm must still be done.
+    ``timeout_s`` may be infinite; ``stop`` ends the waiting at once. Jobs are never taken back: a
+    disarm that waits behind a hanging arm must still be done.
     """
     until = time.monotonic() + timeout_s
     done: dict[str, T] = {}
     problems: dict[str, str] = {}
     for name, future in futures.items():
         try:
-            done[name] = future.result(max(0.0, until - time.monotonic()))
+            while not future.done() and time.monotonic() < until and not stop():
+                wait([future], max(0.0, min(LOOK_S, until - time.monotonic())))
+            done[name] = future.result(0.0)
         except FutureTimeout:
             problems[name] = f"it did not answer within {timeout_s:.3g} s"
         except RigwrightError as error:

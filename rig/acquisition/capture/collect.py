@@ -5,9 +5,10 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
-from common.errors import DeviceError
+from common.errors import RigwrightError
 from rig.acquisition.cameras.base import (
     CameraDevice,
     ClockSample,
@@ -29,7 +30,9 @@ class Want:
 
     ``first_s``: when the first shot is; ``deadline_s``: when the last picture must be there.
     ``pictures``: how many are waited for, fewer than ``shots`` once a burst is known to have been
-    stopped. ``ready_stamp``: what the camera's clock said when it was ready.
+    stopped. ``patience_s``: how long to wait at least once it is known that the shots were made:
+    where the computer is busy, that may be later than ``deadline_s``. ``ready_stamp``: what the
+    camera's clock said when it was ready. ``kinds``: media types each shot must bring.
     """
 
     shots: int
@@ -40,7 +43,20 @@ class Want:
     settle_s: float
     start: threading.Event
     give_up: threading.Event
+    known_s: Callable[[], float | None] = lambda: None
+    """When it became known that the shots were made, in seconds of the monotonic clock."""
+    patience_s: float = 0.0
     ready_stamp: int | None = None
+    kinds: frozenset[str] = frozenset()
+
+
+@dataclass(frozen=True)
+class Command:
+    """One shot that a camera was told to make over its bus. ``problem``: why the call failed."""
+
+    shot: int
+    at: HostInterval
+    problem: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +64,7 @@ class Collected:
     """What a camera gave. ``sent``: when it was told over its bus, shot by shot."""
 
     frames: tuple[Frame, ...] = ()
-    sent: tuple[HostInterval, ...] = ()
+    sent: tuple[Command, ...] = ()
     clock_samples: tuple[ClockSample, ...] = ()
     problem: str = ""
 
@@ -60,67 +76,112 @@ def read_clock(device: CameraDevice) -> tuple[ClockSample, ...]:
     return tuple(device.clock_samples(CLOCK_READINGS))
 
 
-def collect(device: CameraDevice, want: Want) -> Collected:
-    """Trigger the camera where that is the host's part, and wait for its pictures."""
-    want.start.wait()
-    began, start_ns = time.monotonic(), time.monotonic_ns()
-    sent: tuple[HostInterval, ...] = ()
-    frames: tuple[Frame, ...] = ()
-    samples: tuple[ClockSample, ...] = ()
-    try:
-        if device.capabilities.trigger is TriggerKind.SOFTWARE:
-            sent = _command(device, want, began)
-        frames = _wait(device, want, began, start_ns)
-        samples = read_clock(device)
-    except DeviceError as error:
-        return Collected(frames, sent, samples, error.problem)
-    return Collected(frames, sent, samples, device.health().problem)
+class Collector:
+    """Triggers one camera where that is the host's part, and waits for its pictures.
 
+    :meth:`run` is for the camera's own thread; :meth:`so_far` for any: what a camera has given is
+    kept, also where its library raises, hangs or dies.
+    """
 
-def _command(device: CameraDevice, want: Want, began: float) -> tuple[HostInterval, ...]:
-    sent = []
-    for k in range(want.shots):
-        due = began + want.first_s + k * want.interval_s
-        if want.give_up.wait(max(0.0, due - time.monotonic())):
-            break
-        before = time.monotonic_ns()
-        device.software_trigger()
-        sent.append(HostInterval(before, time.monotonic_ns()))
-    return tuple(sent)
+    def __init__(self, device: CameraDevice, want: Want) -> None:
+        self._device, self._want = device, want
+        self._lock = threading.Lock()
+        self._got = Collected()
+        self._began, self._start_ns = 0.0, 0
 
+    def so_far(self, problem: str = "") -> Collected:
+        """What came until now; ``problem`` is why no more will."""
+        with self._lock:
+            return replace(self._got, problem=problem or self._got.problem)
 
-def _wait(device: CameraDevice, want: Want, began: float, start_ns: int) -> tuple[Frame, ...]:
-    frames: tuple[Frame, ...] = ()
-    until = began + want.deadline_s
-    while wanted(frames, want, start_ns) < want.pictures() and not want.give_up.is_set():
-        left = until - time.monotonic()
-        if left <= 0.0:
-            return frames
-        # More than there are, beside those that do not count: one more ends the wait.
-        others = len(frames) - wanted(frames, want, start_ns)
-        count = max(want.pictures() + others, 1)
-        frames = tuple(device.wait_frames(count, min(SLICE_S, left)))
-        if not device.health().connected:
-            return frames
-    if want.give_up.is_set():
+    def _keep(self, **changes: Any) -> None:  # noqa: ANN401  fields of Collected
+        with self._lock:
+            self._got = replace(self._got, **changes)
+
+    def run(self) -> Collected:
+        """All of it; what the library raises becomes the camera's problem."""
+        self._want.start.wait()
+        self._began, self._start_ns = time.monotonic(), time.monotonic_ns()
+        try:
+            if self._device.capabilities.trigger is TriggerKind.SOFTWARE:
+                self._command()
+            self._wait()
+            self._keep(clock_samples=read_clock(self._device))
+        except RigwrightError as error:
+            return self.so_far(self._said() or error.problem)
+        except Exception as error:  # noqa: BLE001  a fault of one backend costs its camera only
+            return self.so_far(f"its backend failed ({type(error).__name__}: {error})")
+        return self.so_far(self._said() or self._device.health().problem)
+
+    def _said(self) -> str:
+        """Why a command failed: it tells more than what a camera says afterwards."""
+        return next((command.problem for command in self._got.sent if command.problem), "")
+
+    def _command(self) -> None:
+        want = self._want
+        for k in range(want.shots):
+            due = self._began + want.first_s + k * want.interval_s
+            if want.give_up.wait(max(0.0, due - time.monotonic())):
+                return
+            before, problem = time.monotonic_ns(), ""
+            try:
+                self._device.software_trigger()
+            except RigwrightError as error:
+                # A body that could not focus may make the next shot; one that is gone says so.
+                problem = error.problem
+            command = Command(k + 1, HostInterval(before, time.monotonic_ns()), problem)
+            self._keep(sent=(*self._got.sent, command))
+            if problem and not self._device.health().connected:
+                return
+
+    def _expected(self) -> int:
+        """Pictures to wait for: none of shots that the camera could not be told to make."""
+        failed = sum(bool(command.problem) for command in self._got.sent)
+        return self._want.pictures() - failed
+
+    def _until(self) -> float:
+        until, known = self._began + self._want.deadline_s, self._want.known_s()
+        return until if known is None else max(until, known + self._want.patience_s)
+
+    def _wait(self) -> None:
+        want, frames = self._want, tuple[Frame, ...]()
+        while not want.give_up.is_set():
+            there = wanted(frames, want, self._start_ns)
+            if there >= self._expected() and (frames or self._expected() > 0):
+                # One more than wanted: returns at once when a picture turns up that nobody
+                # asked for.
+                frames = self._take(len(frames) + 1, want.settle_s)
+                return
+            left = self._until() - time.monotonic()
+            # More than there are, beside those that do not count: one more ends the wait.
+            count = max(self._expected() + len(frames) - there, 1)
+            # Once more at the end: what has come must be taken, however late this thread wakes.
+            frames = self._take(count, max(0.0, min(SLICE_S, left)))
+            if left <= 0.0 or not self._device.health().connected:
+                return
+
+    def _take(self, count: int, timeout_s: float) -> tuple[Frame, ...]:
+        frames = tuple(self._device.wait_frames(count, timeout_s))
+        self._keep(frames=frames)
         return frames
-    # One more than wanted: returns at once when a picture turns up that nobody asked for.
-    return tuple(device.wait_frames(len(frames) + 1, want.settle_s))
 
 
 def wanted(frames: Sequence[Frame], want: Want, start_ns: int) -> int:
     """How many of the pictures can be of this capture's shots.
 
     Copies count once, and what was there or exposed before FIRE not at all: else the wait would
-    end before the last true picture has come. Of bodies that make two files per shot the kind
-    counts of which there are more.
+    end before the last true picture has come. Where each shot makes files of several kinds, the
+    kind counts of which there are fewest; where it is not said which, that of which there are most.
     """
-    seen: dict[bool, set[tuple[int | None, ...]]] = {False: set(), True: set()}
+    seen: dict[str, set[tuple[int | None, ...]]] = {kind: set() for kind in want.kinds}
     for k, frame in enumerate(frames):
         stale = frame.arrived_host_ns < start_ns
         if want.ready_stamp is not None and frame.device_ns is not None:
             stale |= frame.device_ns < want.ready_stamp
         if not stale:
             known = frame.counter is not None or frame.device_ns is not None
-            seen[is_raw(frame)].add((frame.counter, frame.device_ns) if known else (k,))
-    return max(map(len, seen.values()))
+            kind = frame.media_type if want.kinds else str(is_raw(frame))
+            seen.setdefault(kind, set()).add((frame.counter, frame.device_ns) if known else (k,))
+    if want.kinds:
+        return min(len(seen[kind]) for kind in want.kinds)
+    return max(map(len, seen.values()), default=0)

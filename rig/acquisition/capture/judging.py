@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from common.errors import DeviceError
@@ -11,7 +11,7 @@ from rig.acquisition.capture.camerathreads import CameraThread
 from rig.acquisition.capture.collect import Collected
 from rig.acquisition.capture.firing import Firing
 from rig.acquisition.station.spec import CameraPlan, Station
-from rig.acquisition.synchrony.cameraframes import CameraFrames, Pairing
+from rig.acquisition.synchrony.cameraframes import CameraFrames, Method, Pairing
 from rig.acquisition.synchrony.capturedata import CameraPart, CaptureData
 from rig.acquisition.synchrony.clocks import ClockFitter, DeviceClock, TriggerTime, clock_jumped
 from rig.acquisition.synchrony.faults import Fault, FaultKind
@@ -33,7 +33,12 @@ def pair_and_judge(station: Station, firing: Firing, fit: ClockFitter, sizes: Si
     shots = _shots_done(firing)
     parts = tuple(_part(station, firing, thread, fit, sizes, shots) for thread in firing.threads)
     _require_fired(firing, parts)
-    faults = [*firing.faults, *_stopped(firing, shots), *swapped(station, parts)]
+    faults = [
+        *firing.faults,
+        *_stopped(firing, shots),
+        *swapped(station, parts),
+        *_by_arrival(parts),
+    ]
     return CaptureData(
         capture_id=firing.order.capture_id,
         shots=firing.order.shots,
@@ -67,6 +72,15 @@ def _require_fired(firing: Firing, parts: tuple[CameraPart, ...]) -> None:
             f"({firing.report.why or 'the box was lost'})",
             "see to the box, then take a new capture under another id",
         )
+
+
+def _by_arrival(parts: Sequence[CameraPart]) -> list[Fault]:
+    """Said once for the whole rig: it is true of every picture of such cameras."""
+    names = [p.plan.name for p in parts if any(o.method is Method.ARRIVAL for o in p.pairing.pairs)]
+    if not names:
+        return []
+    text = f"the pictures of {', '.join(names)} were given to the shots by order of arrival only"
+    return [Fault(FaultKind.BY_ARRIVAL, text)]
 
 
 def _stopped(firing: Firing, shots: int) -> list[Fault]:
@@ -105,7 +119,8 @@ def _part(
         lag_tolerance_us=plan.lag_tolerance_us,
         deadline_s=station.policy.frame_deadline_s,
     )
-    paired = _explained(_judged(_pair_if_shot(received), sizes.get(name)), got.problem)
+    judged = _judged(_pair_if_shot(received), sizes.get(name))
+    paired = _explained(_accounted(judged, shots), got.problem)
     beside = _pair_if_shot(replace(received, frames=raws)) if pictures and raws else None
     return CameraPart(
         thread.plan, thread.device.info, ready.settings, received, paired, beside, samples
@@ -140,8 +155,36 @@ def _trigger_times(
     shots: int,
 ) -> tuple[TriggerTime, ...]:
     if capabilities.trigger is TriggerKind.SOFTWARE:
-        return command_times(got.sent)
+        return _command_times(got)
     return edge_times(station, plan, firing.report, firing.fired, shots, firing.order.interval_us)
+
+
+def _command_times(got: Collected) -> tuple[TriggerTime, ...]:
+    """When a camera was told over its bus.
+
+    A command that failed may have been carried out all the same. It counts where the camera's
+    stamps can tell, or where more pictures came than commands went well; else a camera that made
+    what it could would lose its good pictures to a shot that it never made.
+    """
+    well = [command for command in got.sent if not command.problem]
+    stamped = all(frame.device_ns is not None for frame in got.frames)
+    counted = got.sent if stamped or len(got.frames) > len(well) else well
+    return command_times({command.shot: command.at for command in counted})
+
+
+def _accounted(pairing: Pairing, shots: int) -> Pairing:
+    """The same with a fault for each shot that lacks its picture and has none yet."""
+    told = {fault.shot for fault in pairing.faults if not fault.harmless}
+    if None in told:
+        return pairing
+    silent = [
+        Fault(
+            FaultKind.MISSING, f"{pairing.camera}: no picture of shot {shot}", pairing.camera, shot
+        )
+        for shot in range(1, shots + 1)
+        if pairing.pair(shot) is None and shot not in told
+    ]
+    return replace(pairing, faults=(*pairing.faults, *silent))
 
 
 def _judged(pairing: Pairing, size_px: tuple[int, int] | None) -> Pairing:

@@ -11,7 +11,7 @@ from rig.acquisition.cameras.base import CameraHealth
 from rig.acquisition.session.records import CaptureRecord
 from rig.acquisition.station.delays import Timing
 from rig.acquisition.station.spec import Station
-from rig.acquisition.synchrony.faults import Fault
+from rig.acquisition.synchrony.faults import HARMLESS, Fault
 from rig.acquisition.synchrony.lags import LagEstimate, estimate_lags, new_timings
 from rig.acquisition.synchrony.verdict import Evidence
 from rig.acquisition.trigger.box import TriggerHealth
@@ -33,7 +33,8 @@ class CaptureResult:
         """
         if self.record.state == "complete" or self.record.partial_allowed:
             return None
-        told = [fault.text for fault in self.record.faults]
+        # What is missing must not be buried under what does no harm.
+        told = [fault.text for fault in self.record.faults if fault.kind not in HARMLESS]
         more = f", and {len(told) - 3} more" if len(told) > 3 else ""
         return DeviceError(
             "capture-partial",

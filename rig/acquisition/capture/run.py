@@ -6,6 +6,7 @@ import contextlib
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import Future
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from functools import partial
@@ -14,7 +15,7 @@ from common.errors import CancelledError, DeviceError, InterlockError, Rigwright
 from common.progress import CancelToken, Progress, ProgressCallback
 from rig.acquisition.cameras.base import ArmSpec, CameraDevice, CameraSettings
 from rig.acquisition.capture.camerathreads import CameraThread, do_all, outcomes
-from rig.acquisition.capture.collect import Collected, Want, collect, read_clock
+from rig.acquisition.capture.collect import Collected, Collector, Want, read_clock
 from rig.acquisition.capture.firing import FATES, CaptureOrder, Fate, Firing, Ready
 from rig.acquisition.station.pulses import arm_request
 from rig.acquisition.station.spec import Interlock, Station
@@ -48,6 +49,7 @@ class CaptureRun:
     _armed: list[str] = field(default_factory=list)
     _give_up: threading.Event = field(default_factory=threading.Event)
     _pictures: int = 0
+    _known_s: float | None = None
 
     def run(self) -> Firing:
         """Arm, fire and collect. :attr:`fate` says what is known of FIRE, also after an error.
@@ -140,10 +142,11 @@ class CaptureRun:
         self.progress(Progress("firing", 0.3))
         self._pictures = self.order.shots
         start = threading.Event()
-        jobs = {
-            thread.plan.name: thread.do(partial(collect, want=self._want(thread, ready, start)))
+        collectors = {
+            thread.plan.name: Collector(thread.device, self._want(thread, ready, start))
             for thread in threads
         }
+        jobs = {thread.plan.name: _collect(thread, collectors) for thread in threads}
         self.fate = Fate.UNKNOWN
         before = time.monotonic_ns()
         start.set()
@@ -153,15 +156,17 @@ class CaptureRun:
                 fired = HostInterval(before, time.monotonic_ns())
                 wall = datetime.fromtimestamp(time.time(), UTC).astimezone()
                 report = self._await_box(problem, request)
+                self._known_s = time.monotonic()
                 self.progress(Progress("waiting for pictures", 0.4))
                 patience_s = self._last_deadline_s() + BOX_MARGIN_S + _overrun_s(threads)
-                collected, problems = outcomes(jobs, patience_s)
+                collected, problems = outcomes(jobs, patience_s, self.cancel.is_set)
         finally:
             # The camera threads must not go on waiting for pictures that nobody will take.
             self._give_up.set()
         self._stop_if_cancelled()
         for name, text in problems.items():
-            collected[name] = Collected(problem=text)
+            # What a camera gave before its library hung is as good as any other picture.
+            collected[name] = collectors[name].so_far(text)
         absent = tuple(fault.camera for fault in faults if fault.camera is not None)
         return Firing(
             self.order, request, report, fired, wall, threads, ready, collected, absent, faults
@@ -182,6 +187,8 @@ class CaptureRun:
             settle_s=policy.settle_s,
             start=start,
             give_up=self._give_up,
+            known_s=lambda: self._known_s,
+            patience_s=policy.frame_deadline_s,
             ready_stamp=max((sample.device_ns for sample in samples), default=None),
         )
 
@@ -243,7 +250,10 @@ class CaptureRun:
         over = threading.Event()
 
         def watch() -> None:
-            while not over.wait(WATCH_S):
+            ended = False
+            while not ended:
+                # Looked at once more at the end: whoever waits may have seen the cancel first.
+                ended = over.wait(WATCH_S)
                 if self.cancel.is_set():
                     self._give_up.set()
                     if self.box is not None:
@@ -266,6 +276,11 @@ class CaptureRun:
                 with contextlib.suppress(RigwrightError):
                     self.box.disarm(name)
         do_all(self.threads, lambda device: device.disarm(), self.station.policy.ready_deadline_s)
+
+
+def _collect(thread: CameraThread, collectors: Mapping[str, Collector]) -> Future[Collected]:
+    collector = collectors[thread.plan.name]
+    return thread.do(lambda _: collector.run())
 
 
 def _overrun_s(threads: tuple[CameraThread, ...]) -> float:

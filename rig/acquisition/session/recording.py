@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 
+from common.errors import InternalError
 from common.files.plain import plain
-from rig.acquisition.session.records import CaptureRecord, FileEntry
+from rig.acquisition.session.records import CaptureRecord, FileEntry, contradictions
 from rig.acquisition.synchrony.cameraframes import Pair
 from rig.acquisition.synchrony.capturedata import CameraPart, CaptureData
 from rig.acquisition.synchrony.evidence import CameraTiming, FrameTiming, sync_class
@@ -64,7 +65,11 @@ def make_record(
         "timing": evidence.stamps.shots,
         "optical": evidence.optical,
     }
-    return CaptureRecord.model_validate(plain(document))
+    record = CaptureRecord.model_validate(plain(document))
+    wrong = contradictions(record)
+    if wrong:
+        raise InternalError("record", f"capture {record.capture_id}: {wrong[0]}", "report this")
+    return record
 
 
 def _camera(part: CameraPart, timing: CameraTiming) -> dict[str, object]:

@@ -211,6 +211,27 @@ class CaptureRecord(StrictModel):
     optical: OpticalEntry | None = Field(description="The timing board; null: not looked for.")
 
 
+def contradictions(record: CaptureRecord) -> list[str]:
+    """What a record says against itself, a sentence each; none may be written that does.
+
+    Records written before this was looked at can be read, and are found by ``verify_session``.
+    """
+    have = {(frame.camera, frame.shot) for frame in record.frames}
+    names = {camera.name for camera in record.cameras}
+    lost = {(name, shot) for name, shots in record.missing.items() for shot in shots}
+    wanted = {(name, shot) for name in names for shot in range(1, record.shots + 1)}
+    found = []
+    if record.state == "complete" and lost:
+        found.append(f"it is complete and lacks a picture of {min(lost)[0]}")
+    found += [f"a picture of {name} is filed and missing" for name, _ in sorted(have & lost)]
+    found += [
+        f"{name} has no picture of shot {shot}, and nothing says so"
+        for name, shot in sorted(wanted - have - lost)
+    ]
+    found += [f"a picture of {name} is of no camera or shot" for name, _ in sorted(have - wanted)]
+    return found
+
+
 class CaptureEntry(StrictModel):
     """A committed capture as the session lists it."""
 

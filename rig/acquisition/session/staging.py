@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from datetime import timedelta
 
-from common.errors import ConflictError
+from common.errors import ConflictError, RigwrightError
 from rig.acquisition.session import paths
 from rig.acquisition.session.commit import clear_stage, publish, set_aside
 from rig.acquisition.session.exif import PictureFacts
@@ -93,7 +93,8 @@ class Stage:
         session = self._session
         numbering = Numbering(session.next_number, session.next_instant)
         with disk_errors(session.folder):
-            files, faults = self._write_pictures(captured, policy, numbering, focal_mm or {})
+            files, faults, lost = self._write_pictures(captured, policy, numbering, focal_mm or {})
+            captured = captured.without(lost)
             seconds = time.monotonic() - began
             if seconds > SLOW_S:
                 faults.append(_slow(files, seconds))
@@ -117,19 +118,27 @@ class Stage:
         policy: CapturePolicy,
         numbering: Numbering,
         focal_mm: Mapping[str, float],
-    ) -> tuple[list[FiledFrame], list[Fault]]:
-        def write(one: tuple[CameraPart, Pair, bool]) -> tuple[FiledFrame, bool]:
+    ) -> tuple[list[FiledFrame], list[Fault], list[Fault]]:
+        """The files, what is to be said of them, and a fault for each that could not be coded."""
+
+        def write(one: tuple[CameraPart, Pair, bool]) -> tuple[FiledFrame, bool] | Fault:
             part, pair, raw = one
             name, instant = part.plan.name, numbering.first_instant + pair.shot - 1
             facts = picture_facts(captured, part, pair, focal_mm.get(name))
-            file = filed(pair.frame, facts, policy)
+            try:
+                file = filed(pair.frame, facts, policy)
+            except (RigwrightError, OSError, ValueError) as error:
+                # One picture that nothing can code must not cost all the others.
+                text = f"{name}: the picture of shot {pair.shot} cannot be filed ({error})"
+                return Fault(FaultKind.MISSING, text, name, pair.shot)
             path = paths.picture(name, instant, file.suffix, raw=raw)
             self._write(path, file.data)
             done = FiledFrame(part, pair, raw, entry(path, file.data), file.media_type)
             return done, file.as_png
 
         with ThreadPoolExecutor(self._writers, "capture-writer") as pool:
-            written = list(pool.map(write, _pictures(captured)))
+            outcomes = list(pool.map(write, _pictures(captured)))
+        written = [one for one in outcomes if not isinstance(one, Fault)]
         faults = [
             Fault(
                 FaultKind.FILED_AS_PNG,
@@ -141,7 +150,8 @@ class Stage:
             for one, as_png in written
             if as_png
         ]
-        return [one for one, _ in written], faults
+        lost = [one for one in outcomes if isinstance(one, Fault)]
+        return [one for one, _ in written], faults, lost
 
     def _write(self, path: str, data: bytes) -> None:
         disk, target = self._session.index.disk, self._folder / path

@@ -13,7 +13,7 @@ from pathlib import Path
 from common.errors import InputError
 from rig.acquisition.session import paths
 from rig.acquisition.session.index import SessionIndex, read_index
-from rig.acquisition.session.records import CaptureEntry, CaptureRecord, FileEntry
+from rig.acquisition.session.records import CaptureEntry, CaptureRecord, FileEntry, contradictions
 from rig.acquisition.session.storage import Disk, file_sha256, sha256
 from rig.acquisition.session.tables import tables
 
@@ -110,6 +110,9 @@ def _contradictions(index: SessionIndex) -> Iterator[SessionFinding]:
         path = listed.record.path
         if not _agree(listed, record):
             text = f"{path} and session.json contradict each other"
+            yield SessionFinding(SessionFindingKind.CONTRADICTION, path, text)
+        for wrong in contradictions(record):
+            text = f"{path} contradicts itself: {wrong}"
             yield SessionFinding(SessionFindingKind.CONTRADICTION, path, text)
         for frame in record.frames:
             suffix = Path(frame.file.path).suffix

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from datetime import datetime
 
 from rig.acquisition.cameras.base import CameraInfo, CameraSettings, ClockSample
@@ -26,6 +26,11 @@ class CameraPart:
     raws: Pairing | None = None
     """Raw files that came beside the pictures, paired by themselves."""
     clock_samples: tuple[ClockSample, ...] = ()
+
+    def without(self, shots: Collection[int | None]) -> CameraPart:
+        """The same without the pictures of some shots."""
+        left = tuple(one for one in self.pairing.pairs if one.shot not in shots)
+        return replace(self, pairing=replace(self.pairing, pairs=left))
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +65,15 @@ class CaptureData:
     @property
     def whole(self) -> bool:
         """Whether every camera of the station gave a sound picture of every shot asked for."""
-        return not self.absent and all(fault.harmless for fault in self.all_faults)
+        return not self.missing() and all(fault.harmless for fault in self.all_faults)
+
+    def without(self, lost: Sequence[Fault]) -> CaptureData:
+        """The same without the pictures that these faults are about, which it then carries."""
+        gone = {(fault.camera, fault.shot) for fault in lost}
+        parts = tuple(
+            part.without({s for name, s in gone if name == part.plan.name}) for part in self.parts
+        )
+        return replace(self, parts=parts, faults=(*self.faults, *lost))
 
     def missing(self) -> Mapping[str, Sequence[int]]:
         """Shots (from 1) without a picture, by camera; cameras that have all are left out."""

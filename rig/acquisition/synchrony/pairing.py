@@ -56,8 +56,27 @@ def pair(received: CameraFrames) -> Pairing:
     else:
         pairs, found = _by_arrival(received, exposures)
     faults += found
+    pairs, found = _with_pictures(received, pairs)
+    faults += found
     faults += [fault for one in pairs for fault in _of_status(received, one)]
     return Pairing(received.camera, tuple(pairs), tuple(faults))
+
+
+def _with_pictures(received: CameraFrames, pairs: Sequence[Pair]) -> tuple[list[Pair], list[Fault]]:
+    """The pairs whose frames hold a picture, and a fault for each whose transport lost it."""
+    good = [one for one in pairs if one.frame.has_picture]
+    lost = [
+        Fault(
+            FaultKind.MISSING,
+            f"{received.camera}: the picture of shot {one.shot} was lost on its way"
+            + (f" ({why})" if (why := one.frame.metadata.get("problem")) else ""),
+            received.camera,
+            one.shot,
+        )
+        for one in pairs
+        if not one.frame.has_picture
+    ]
+    return good, lost
 
 
 def window_us(received: CameraFrames, uncertainty_us: float) -> tuple[float, float]:
@@ -256,12 +275,11 @@ def _by_arrival(
     problem = _order_problem(received, rest)
     if problem is not None:
         return [], [*faults, problem]
-    text = f"{received.camera}: its pictures were given to the shots by order of arrival only"
     pairs = [
         Pair(trigger_time.shot, e.frame, Method.ARRIVAL)
         for trigger_time, e in zip(received.trigger_times, rest, strict=True)
     ]
-    return pairs, [*faults, Fault(FaultKind.BY_ARRIVAL, text, received.camera)]
+    return pairs, faults
 
 
 def _order_problem(received: CameraFrames, rest: Sequence[Exposure]) -> Fault | None:

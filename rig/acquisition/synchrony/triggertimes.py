@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from rig.acquisition.station.spec import CameraPlan, Station
@@ -63,9 +63,9 @@ def edge_times(
     )
 
 
-def command_times(sent: Sequence[HostInterval]) -> tuple[TriggerTime, ...]:
-    """When a camera was told over its bus."""
+def command_times(sent: Mapping[int, HostInterval]) -> tuple[TriggerTime, ...]:
+    """When a camera was told over its bus, by shot."""
     return tuple(
-        TriggerTime(k, b.middle_ns, b.half_width_us, TriggerTimeSource.COMMAND)
-        for k, b in enumerate(sent, start=1)
+        TriggerTime(shot, told.middle_ns, told.half_width_us, TriggerTimeSource.COMMAND)
+        for shot, told in sorted(sent.items())
     )

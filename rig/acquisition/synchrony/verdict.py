@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -115,22 +116,56 @@ def _decided(
     limit_us: float,
     lacking: tuple[str, ...],
 ) -> Verdict:
-    if len([p for p in captured.parts if p.pairing.pairs]) < 2:
+    cameras, lost = len(captured.parts) + len(captured.absent), sorted(captured.missing())
+    if cameras == 1 and not lost:
         text = "one camera alone: there is nothing to be synchronised with"
         return Verdict(SyncState.SYNCHRONISED, level, 0.0, limit_us, text, lacking)
+    how = "the timing board" if level is Level.OPTICAL else "the cameras' time stamps"
     passed = against(limit_us, spread_us, uncertainty_us)
+    if lost:
+        told = _incomplete(captured, how, spread_us, uncertainty_us, lost)
+        if passed is Passed.FAIL:
+            return Verdict(
+                SyncState.NOT_SYNCHRONISED,
+                level,
+                spread_us + uncertainty_us,
+                limit_us,
+                f"not synchronised: {told}; the limit is {limit_us:.0f} us",
+                lacking,
+            )
+        # What came in time proves nothing of the cameras that gave no picture.
+        return Verdict(
+            SyncState.UNPROVEN, Level.NONE, math.nan, limit_us, f"not proven: {told}", lacking
+        )
     states = {
         Passed.PASS: (SyncState.SYNCHRONISED, "synchronised"),
         Passed.FAIL: (SyncState.NOT_SYNCHRONISED, "not synchronised"),
         Passed.UNDECIDED: (SyncState.UNDECIDED, "not decided"),
     }
     state, word = states.get(passed or Passed.UNDECIDED, states[Passed.UNDECIDED])
-    how = "the timing board" if level is Level.OPTICAL else "the cameras' time stamps"
     text = (
-        f"{word}: the exposures lie within {spread_us:.0f} us by {how} (+- {uncertainty_us:.0f} "
-        f"us; the limit is {limit_us:.0f} us)"
+        f"{word}: the exposures of all {cameras} cameras lie within {spread_us:.0f} us by {how} "
+        f"(+- {uncertainty_us:.0f} us; the limit is {limit_us:.0f} us)"
     )
     return Verdict(state, level, spread_us + uncertainty_us, limit_us, text, lacking)
+
+
+def _incomplete(
+    captured: CaptureData,
+    how: str,
+    spread_us: float,
+    uncertainty_us: float,
+    names: Sequence[str],
+) -> str:
+    """What can be said where cameras lack pictures."""
+    cameras = len(captured.parts) + len(captured.absent)
+    several = sum(bool(part.pairing.pairs) for part in captured.parts) > 1
+    came = (
+        f"those that came lie within {spread_us:.0f} us by {how} (+- {uncertainty_us:.0f} us)"
+        if several
+        else "one camera alone gave any"
+    )
+    return f"{len(names)} of {cameras} cameras lack pictures ({', '.join(names)}); {came}"
 
 
 def _unproven(

@@ -48,7 +48,7 @@ def test_a_fault_is_named_and_harms_nobody_else(
     result = made.rig.capture(made.session, "burst", shots=SHOTS, interval_us=40_000.0)
     record = result.record
     assert {fault.kind for fault in record.faults} == kinds
-    assert {fault.camera for fault in record.faults} <= {"cam02"}
+    assert {fault.camera for fault in record.faults if fault.kind != "by-arrival"} <= {"cam02"}
     assert record.missing == ({"cam02": missing} if missing else {})
     for frame in record.frames:
         assert frame.metadata["truth"] == f"{made.box.fired[0]}/{frame.shot}"

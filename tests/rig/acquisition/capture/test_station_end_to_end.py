@@ -154,7 +154,7 @@ def test_faults_of_simulated_cameras_are_named(tmp_path: Path, fault: str, kinds
         with rig.new_session(tmp_path / "session") as session:
             record = rig.capture(session, "one").record
             assert {f.kind for f in record.faults} == kinds
-            assert {f.camera for f in record.faults} == {"cam02"}
+            assert {f.camera for f in record.faults if f.kind != "by-arrival"} == {"cam02"}
             assert verify_session(session.folder).whole
 
 

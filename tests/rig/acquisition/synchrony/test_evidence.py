@@ -344,7 +344,7 @@ def test_a_synchronisation_check_finds_the_lags_and_mends_them(bench: BenchMaker
     assert after.verdict.state == "synchronised"
     # Jitter of 5 us, and readings of clocks a few microseconds wide.
     assert max(abs(c.skew_us or 0.0) for c in after.cameras) < 50.0
-    assert len(made.session.books.records) == 2, "the check files nothing"
+    assert len(made.session.index.records) == 2, "the check files nothing"
 
 
 def test_a_clock_that_is_set_back_is_seen() -> None:
