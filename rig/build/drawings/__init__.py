@@ -2,23 +2,13 @@
 
 from rig.build.drawings.dxf import dxf_bytes
 from rig.build.drawings.items import Sheet
-from rig.build.drawings.lists import (
-    poses_csv,
-    settings_csv,
-    tapes_csv,
-)
+from rig.build.drawings.lists import poses_csv, settings_csv, tapes_csv
 from rig.build.drawings.pdf import pdf_bytes
 from rig.build.drawings.plates import plate_sheets
 from rig.build.drawings.settingsheet import setting_sheets
-from rig.build.drawings.steps import (
-    plain_steps,
-    steps_text,
-)
+from rig.build.drawings.steps import plain_steps, steps_text
 from rig.build.drawings.svg import svg_bytes
-from rig.build.drawings.templates import (
-    template_pages,
-    template_sheet,
-)
+from rig.build.drawings.templates import template_pages, template_sheet
 from rig.build.drawings.views import view_sheets
 
 __all__ = [

@@ -8,11 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from geometry.arrays import Floats
-from rig.build.drawings.items import (
-    Item,
-    Line,
-    Text,
-)
+from rig.build.drawings.items import Item, Line, Text
 from rig.build.drawings.pdf import text_width_mm
 
 ORDINATE_TEXT_MM = 1.9

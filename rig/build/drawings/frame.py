@@ -8,13 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rig.build.drawings.figures import STATED
-from rig.build.drawings.items import (
-    Circle,
-    Item,
-    Line,
-    Sheet,
-    Text,
-)
+from rig.build.drawings.items import Circle, Item, Line, Sheet, Text
 from rig.build.drawings.pdf import text_width_mm
 
 MARGIN_MM = 10.0

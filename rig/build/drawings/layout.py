@@ -6,13 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from geometry.arrays import Floats
 from common.errors import InputError
-from rig.build.drawings.frame import (
-    A3_LANDSCAPE_MM,
-    BLOCK_MM,
-    MARGIN_MM,
-)
+from geometry.arrays import Floats
+from rig.build.drawings.frame import A3_LANDSCAPE_MM, BLOCK_MM, MARGIN_MM
 
 DENOMINATORS = (1, 2, 2.5, 5, 7.5, 10, 12.5, 15, 20, 25, 30, 40, 50, 75, 100, 150, 200, 500, 1000)
 EDGE_MM = 24.0

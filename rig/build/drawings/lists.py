@@ -7,11 +7,7 @@ import io
 import math
 from collections.abc import Iterable, Sequence
 
-from rig.build.drawings.figures import (
-    mm,
-    pose_figures,
-    setting_text,
-)
+from rig.build.drawings.figures import mm, pose_figures, setting_text
 from rig.build.mounts.plan import MountPlan
 
 SETTING_FIELDS = (

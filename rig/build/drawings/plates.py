@@ -6,39 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from geometry.arrays import Floats
 from common.errors import InputError
-from rig.build.drawings.annotate import (
-    Ordinate,
-    merged,
-    ordinate_items,
-)
+from geometry.arrays import Floats
+from rig.build.drawings.annotate import Ordinate, merged, ordinate_items
 from rig.build.drawings.figures import mm
-from rig.build.drawings.frame import (
-    A3_LANDSCAPE_MM,
-    BLOCK_MM,
-    MARGIN_MM,
-    Content,
-    framed,
-)
-from rig.build.drawings.items import (
-    Circle,
-    Dimension,
-    Item,
-    Line,
-    Sheet,
-    Text,
-)
+from rig.build.drawings.frame import A3_LANDSCAPE_MM, BLOCK_MM, MARGIN_MM, Content, framed
+from rig.build.drawings.items import Circle, Dimension, Item, Line, Sheet, Text
 from rig.build.drawings.layout import DENOMINATORS
-from rig.build.drawings.tables import (
-    Table,
-    table_items,
-    table_sheets,
-)
-from rig.build.mounts.structure import (
-    Hole,
-    Plate,
-)
+from rig.build.drawings.tables import Table, table_items, table_sheets
+from rig.build.mounts.structure import Hole, Plate
 
 EDGE_MM = 26.0
 HOLE_COLUMNS = ("No.", "Hole", "X mm", "Y mm", "Ø mm", "Kind", "Thread")

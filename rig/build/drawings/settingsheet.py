@@ -8,46 +8,14 @@ import numpy as np
 
 from geometry.arrays import Floats
 from rig.build.drawings.annotate import Labels
-from rig.build.drawings.figures import (
-    POSE_COLUMNS,
-    fixed,
-    mm,
-    pose_figures,
-    setting_text,
-)
-from rig.build.drawings.frame import (
-    A4_MM,
-    BLOCK_MM,
-    MARGIN_MM,
-    Content,
-    fitted,
-    framed,
-)
-from rig.build.drawings.items import (
-    Item,
-    Line,
-    Sheet,
-    Text,
-)
-from rig.build.drawings.layout import (
-    FRONT,
-    TOP,
-    PlacedView,
-    SheetView,
-)
-from rig.build.drawings.tables import (
-    Table,
-    table_items,
-)
+from rig.build.drawings.figures import POSE_COLUMNS, fixed, mm, pose_figures, setting_text
+from rig.build.drawings.frame import A4_MM, BLOCK_MM, MARGIN_MM, Content, fitted, framed
+from rig.build.drawings.items import Item, Line, Sheet, Text
+from rig.build.drawings.layout import FRONT, TOP, PlacedView, SheetView
+from rig.build.drawings.tables import Table, table_items
 from rig.build.drawings.views import plan_solids
-from rig.build.mounts.plan import (
-    MountPlan,
-    Tolerance,
-)
-from rig.build.mounts.settings import (
-    CameraMount,
-    Setting,
-)
+from rig.build.mounts.plan import MountPlan, Tolerance
+from rig.build.mounts.settings import CameraMount, Setting
 from rig.solids.sight import outline
 
 SETTING_COLUMNS = ("Setting", "Set to", "Unit", "Step", "May be off by", "Measured from")

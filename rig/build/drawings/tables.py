@@ -7,18 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rig.build.drawings.frame import (
-    A4_MM,
-    BLOCK_MM,
-    MARGIN_MM,
-    Content,
-    fitted,
-)
-from rig.build.drawings.items import (
-    Item,
-    Line,
-    Text,
-)
+from rig.build.drawings.frame import A4_MM, BLOCK_MM, MARGIN_MM, Content, fitted
+from rig.build.drawings.items import Item, Line, Text
 from rig.build.drawings.pdf import text_width_mm
 
 ROW_MM = 4.6

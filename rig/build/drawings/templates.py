@@ -4,27 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from geometry.arrays import Floats, Ints
 from common.errors import InputError
+from geometry.arrays import Floats, Ints
 from rig.build.drawings.figures import mm
-from rig.build.drawings.frame import (
-    A4_MM,
-    MARGIN_MM,
-    box,
-)
-from rig.build.drawings.items import (
-    Circle,
-    Item,
-    Line,
-    Sheet,
-    Text,
-)
-from rig.build.drawings.plates import (
-    PlateDrawing,
-    hole_centre,
-    plate_drawing,
-    plate_shape,
-)
+from rig.build.drawings.frame import A4_MM, MARGIN_MM, box
+from rig.build.drawings.items import Circle, Item, Line, Sheet, Text
+from rig.build.drawings.plates import PlateDrawing, hole_centre, plate_drawing, plate_shape
 from rig.build.mounts.structure import Plate
 
 PAPERS_MM = {"A4": A4_MM, "A3": (297.0, 420.0)}

@@ -7,49 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from geometry.arrays import Floats
-from rig.solids.bodies import place_body
-from rig.build.drawings.annotate import (
-    PITCH_MM,
-    Labels,
-    Ordinate,
-    merged,
-    ordinate_items,
-)
-from rig.build.drawings.figures import (
-    POSE_COLUMNS,
-    mm,
-    pose_figures,
-)
-from rig.build.drawings.frame import (
-    A3_LANDSCAPE_MM,
-    MARGIN_MM,
-    Content,
-    framed,
-)
+from rig.build.drawings.annotate import PITCH_MM, Labels, Ordinate, merged, ordinate_items
+from rig.build.drawings.figures import POSE_COLUMNS, mm, pose_figures
+from rig.build.drawings.frame import A3_LANDSCAPE_MM, MARGIN_MM, Content, framed
 from rig.build.drawings.hidden import visible_lines
-from rig.build.drawings.items import (
-    CameraMark,
-    Dimension,
-    Item,
-    Line,
-    Sheet,
-    Text,
-)
-from rig.build.drawings.layout import (
-    EDGE_MM,
-    PlacedView,
-    arranged,
-)
-from rig.build.drawings.tables import (
-    Table,
-    table_items,
-    table_sheets,
-)
+from rig.build.drawings.items import CameraMark, Dimension, Item, Line, Sheet, Text
+from rig.build.drawings.layout import EDGE_MM, PlacedView, arranged
+from rig.build.drawings.tables import Table, table_items, table_sheets
 from rig.build.mounts.plan import MountPlan
-from rig.build.mounts.structure import (
-    Member,
-    Solid,
-)
+from rig.build.mounts.structure import Member, Solid
+from rig.solids.bodies import place_body
 from rig.solids.sight import outline
 
 SIZE_MM = 20.0
@@ -132,7 +99,9 @@ def _drawn(
     return [*items, Text(view.view.title, float(title_x), float(title_y), 2.6, bold=True)]
 
 
-def _named(views: tuple[PlacedView, PlacedView, PlacedView], plan: MountPlan) -> tuple[PlacedView, ...]:
+def _named(
+    views: tuple[PlacedView, PlacedView, PlacedView], plan: MountPlan
+) -> tuple[PlacedView, ...]:
     """The views that name the cameras: of many cameras only the one that spreads them most."""
     if len(plan.mounts) <= MANY:
         return views

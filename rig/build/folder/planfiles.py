@@ -9,18 +9,14 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from geometry.raycast import Occluder
-from rig.build import (
-    wedges,
-    drawings,
-    parts,
-)
-from rig.catalogue import Catalogue, load_catalogue
+from rig.build import drawings, parts, wedges
 from rig.build.drawings import Sheet
-from rig.report.designfolder import json_text
 from rig.build.mounts.plan import MountPlan
 from rig.build.mounts.planfile import plan_document
 from rig.build.mounts.structure import Plate
 from rig.build.page.planscene import plan_glb
+from rig.catalogue import Catalogue, load_catalogue
+from rig.report.designfolder import json_text
 
 if TYPE_CHECKING:
     import trimesh

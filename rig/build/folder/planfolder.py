@@ -7,23 +7,10 @@ import json
 from pathlib import Path
 
 from common.errors import CancelledError
-from common.files.folders import (
-    refuse_others,
-    whole_folder,
-)
+from common.files.folders import refuse_others, whole_folder
+from common.progress import CancelToken, NeverCancelled, Progress, ProgressCallback, ignore_progress
+from rig.build.folder.planfiles import PlanFile, PlanOptions, plan_files
 from rig.build.mounts.plan import MountPlan
-from rig.build.folder.planfiles import (
-    PlanFile,
-    PlanOptions,
-    plan_files,
-)
-from common.progress import (
-    CancelToken,
-    NeverCancelled,
-    Progress,
-    ProgressCallback,
-    ignore_progress,
-)
 
 MANIFEST = "manifest.json"
 SCHEMA = "rigwright.plan-files/1"

@@ -6,11 +6,7 @@ from collections.abc import Iterator
 
 from geometry.camera import RigCamera
 from rig.build.mounts.plan import Clash
-from rig.build.mounts.shapes import (
-    Crowd,
-    ConvexShape,
-    gap_mm,
-)
+from rig.build.mounts.shapes import ConvexShape, Crowd, gap_mm
 from rig.build.mounts.structure import Solid
 from rig.build.mounts.surroundings import Surroundings
 

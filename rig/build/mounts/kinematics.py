@@ -6,17 +6,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from geometry.arrays import Floats
 from common.errors import InputError
+from geometry.arrays import Floats
 from geometry.frames import Pose, pan_tilt_roll_from_rotation
-from rig.build.mounts.settings import (
-    Link,
-    Motion,
-    chain_pose,
-    pose_of,
-    rig_from_camera,
-    shift,
-)
+from rig.build.mounts.settings import Link, Motion, chain_pose, pose_of, rig_from_camera, shift
 
 PLATE_FROM_CAMERA = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 """A camera on a level head: its x is the plate's x, its z the plate's y, its y the plate's -z."""

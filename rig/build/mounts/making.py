@@ -6,51 +6,22 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from common.errors import CancelledError, InputError
+from common.progress import CancelToken, NeverCancelled, Progress, ProgressCallback, ignore_progress
 from geometry.camera import RigCamera
-from common.errors import (
-    CancelledError,
-    InputError,
-)
 from geometry.subject import Subject
-from rig.design.layout import foremost_point
 from rig.build.mounts.clashes import find_clashes
-from rig.build.mounts.plan import (
-    Figures,
-    MountPlan,
-    Price,
-)
+from rig.build.mounts.plan import Figures, MountPlan, Price
 from rig.build.mounts.relaxing import relaxed
-from rig.build.mounts.rounding import (
-    Rounder,
-    nearest,
-    needs_rounding,
-)
+from rig.build.mounts.rounding import Rounder, nearest, needs_rounding
 from rig.build.mounts.settings import CameraMount
 from rig.build.mounts.solids import camera_solids
 from rig.build.mounts.steps import assembly_steps
-from rig.build.mounts.surroundings import (
-    SEAT_HEIGHT_MM,
-    Surroundings,
-    Zone,
-    head_entry,
-)
-from rig.build.mounts.systems.base import (
-    Holding,
-    MountSystem,
-)
-from rig.build.mounts.tolerancing import (
-    Tolerancer,
-    trials_for,
-    yield_share,
-)
+from rig.build.mounts.surroundings import SEAT_HEIGHT_MM, Surroundings, Zone, head_entry
+from rig.build.mounts.systems.base import Holding, MountSystem
+from rig.build.mounts.tolerancing import Tolerancer, trials_for, yield_share
+from rig.design.layout import foremost_point
 from solver.limits import Limits
-from common.progress import (
-    CancelToken,
-    NeverCancelled,
-    Progress,
-    ProgressCallback,
-    ignore_progress,
-)
 from solver.quality import evaluate
 from solver.result import Quality
 

@@ -20,9 +20,9 @@ from geometry.surface import SurfacePoints
 from solver.constraints.table import constraint_table
 from solver.information import normal_matrices
 from solver.limits import BaseHeight, Coverage, Limits
+from solver.problem import Problem
 from solver.quality import Observations
 from solver.result import ConstraintRow, Sense
-from solver.problem import Problem
 
 SAMPLE = 500
 """How many check points stand for the others where only means are asked for."""

@@ -8,16 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from common.errors import (
-    InputError,
-    TooLargeError,
-)
+from common.errors import InputError, TooLargeError
+from common.files.strict import validated
 from geometry.frames import Pose
-from rig.design.designfile import (
-    design_from_mapping,
-    placed_camera,
-    program_version,
-)
+from geometry.rotations import nearest_rotation
 from rig.build.mounts.plan import MountPlan
 from rig.build.mounts.planmodel import (
     SCHEMA,
@@ -33,8 +27,7 @@ from rig.build.mounts.planmodel import (
 )
 from rig.build.mounts.settings import CameraMount
 from rig.build.mounts.structuremodel import StructureModel
-from geometry.rotations import nearest_rotation
-from common.files.strict import validated
+from rig.design.designfile import design_from_mapping, placed_camera, program_version
 
 LARGEST_FILE_BYTES = 200_000_000
 

@@ -8,29 +8,11 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import Field
 
+from common.files.strict import Matrix, StrictModel, Vector
+from rig.build.mounts.plan import Clash, Figures, Price, Tolerance
+from rig.build.mounts.settings import Link, Motion, Setting, Tape
+from rig.build.mounts.structuremodel import StructureModel, Transform, table
 from rig.design.designmodel import PlacedCamera
-from rig.build.mounts.plan import (
-    Clash,
-    Figures,
-    Price,
-    Tolerance,
-)
-from rig.build.mounts.settings import (
-    Link,
-    Motion,
-    Setting,
-    Tape,
-)
-from rig.build.mounts.structuremodel import (
-    StructureModel,
-    Transform,
-    table,
-)
-from common.files.strict import (
-    Matrix,
-    StrictModel,
-    Vector,
-)
 
 SCHEMA: Literal["rigwright.plan/1"] = "rigwright.plan/1"
 Names = list[Annotated[str, Field(max_length=200)]]

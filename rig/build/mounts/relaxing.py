@@ -10,23 +10,14 @@ from collections.abc import Callable
 
 import numpy as np
 
+from common.progress import CancelToken
 from geometry.camera import RigCamera
 from geometry.frames import pan_tilt_roll_from_rotation
 from geometry.subject import Subject
-from rig.build.mounts.kinematics import (
-    ANGLES,
-    head_links,
-)
+from rig.build.mounts.kinematics import ANGLES, head_links
 from rig.build.mounts.rounding import Rounder
-from rig.build.mounts.settings import (
-    CameraMount,
-    Link,
-    Motion,
-    Setting,
-    chain_pose,
-)
+from rig.build.mounts.settings import CameraMount, Link, Motion, Setting, chain_pose
 from solver.limits import Limits
-from common.progress import CancelToken
 from solver.quality import evaluate
 from solver.result import Quality
 

@@ -15,31 +15,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from geometry.camera import RigCamera
-from common.errors import (
-    CancelledError,
-    InputError,
-)
-from geometry.subject import Subject
-from rig.build.mounts.kinematics import (
-    keeping_aim,
-    reach,
-    rotation_at,
-)
-from rig.build.mounts.linear import (
-    LinearLimits,
-    LinearModel,
-)
-from rig.build.mounts.network import (
-    MountNetwork,
-    Score,
-)
-from rig.build.mounts.settings import (
-    CameraMount,
-    Setting,
-)
-from solver.limits import Limits
+from common.errors import CancelledError, InputError
 from common.progress import CancelToken
+from geometry.camera import RigCamera
+from geometry.subject import Subject
+from rig.build.mounts.kinematics import keeping_aim, reach, rotation_at
+from rig.build.mounts.linear import LinearLimits, LinearModel
+from rig.build.mounts.network import MountNetwork, Score
+from rig.build.mounts.settings import CameraMount, Setting
+from solver.limits import Limits
 
 PROBE_MM = 0.5
 """How far a slide is moved to see what it does to the limits."""

@@ -14,9 +14,9 @@ from typing import Self
 
 import numpy as np
 
+from common.errors import InputError
 from geometry.arrays import Floats, frozen
 from geometry.camera import RigCamera
-from common.errors import InputError
 from geometry.frames import Pose
 
 SAME_POSITION_MM = 1e-6

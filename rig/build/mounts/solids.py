@@ -6,9 +6,9 @@ import numpy as np
 
 from geometry.arrays import Floats
 from geometry.camera import RigCamera
-from rig.solids.convex import box_corners
 from rig.build.mounts.kinematics import rotated
 from rig.build.mounts.structure import Solid
+from rig.solids.convex import box_corners
 
 SIDES = 12
 """Sides of the prism about a round part: circumscribed, 3.5 % too large at its corners."""

@@ -2,17 +2,8 @@
 
 from __future__ import annotations
 
-from rig.build.mounts.settings import (
-    CameraMount,
-    Setting,
-)
-from rig.build.mounts.structure import (
-    Joint,
-    Member,
-    Plate,
-    Structure,
-    Wedge,
-)
+from rig.build.mounts.settings import CameraMount, Setting
+from rig.build.mounts.structure import Joint, Member, Plate, Structure, Wedge
 
 
 def assembly_steps(structure: Structure, mounts: tuple[CameraMount, ...]) -> tuple[str, ...]:

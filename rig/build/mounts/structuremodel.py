@@ -7,6 +7,7 @@ from typing import Annotated, Self
 import numpy as np
 from annotated_types import Len
 
+from common.files.strict import Pair, StrictModel, Vector
 from geometry.arrays import Floats
 from rig.build.mounts.structure import (
     Hole,
@@ -17,11 +18,6 @@ from rig.build.mounts.structure import (
     Solid,
     Structure,
     Wedge,
-)
-from common.files.strict import (
-    Pair,
-    StrictModel,
-    Vector,
 )
 
 Row = Annotated[list[float], Len(4, 4)]

@@ -10,13 +10,10 @@ import numpy as np
 from geometry.arrays import Floats
 from geometry.camera import RigCamera
 from geometry.subject import Subject
-from rig.solids.convex import box_corners
-from rig.design.layout import foremost_point
 from rig.build.mounts.shapes import ConvexShape
-from rig.solids.sight import (
-    seen_by,
-    view_corners,
-)
+from rig.design.layout import foremost_point
+from rig.solids.convex import box_corners
+from rig.solids.sight import seen_by, view_corners
 from solver.limits import Limits
 
 HEAD_ENTRY = "head entry"

@@ -13,33 +13,18 @@ from typing import Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from common.errors import (
-    InputError,
-    NotFoundError,
-)
-from rig.catalogue import Catalogue, load_catalogue
+from common.errors import InputError, NotFoundError
+from common.files.strict import StrictModel, Vector, validated
+from common.files.toml import parsed, read_text
 from rig.build.mounts.making import SystemSpec
 from rig.build.mounts.surroundings import Zone
 from rig.build.mounts.systems.arc import ArcSystem
 from rig.build.mounts.systems.base import MountSystem
 from rig.build.mounts.systems.heads import HeadKind
-from rig.build.mounts.systems.parts import (
-    outrigger_of,
-    plate_of,
-    profile_named,
-    stand_named,
-)
+from rig.build.mounts.systems.parts import outrigger_of, plate_of, profile_named, stand_named
 from rig.build.mounts.systems.tripods import TripodSystem
 from rig.build.mounts.systems.tslot import TSlotSystem
-from common.files.strict import (
-    StrictModel,
-    Vector,
-    validated,
-)
-from common.files.toml import (
-    parsed,
-    read_text,
-)
+from rig.catalogue import Catalogue, load_catalogue
 
 SCHEMA: Literal["rigwright.mount/1"] = "rigwright.mount/1"
 

@@ -7,21 +7,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from geometry.camera import RigCamera
 from common.errors import CancelledError
+from common.progress import CancelToken
+from geometry.camera import RigCamera
 from geometry.subject import Subject
 from rig.build.mounts.network import MountNetwork
 from rig.build.mounts.plan import Tolerance
-from rig.build.mounts.rounding import (
-    PROBE_DEG,
-    PROBE_MM,
-)
-from rig.build.mounts.settings import (
-    CameraMount,
-    Setting,
-)
+from rig.build.mounts.rounding import PROBE_DEG, PROBE_MM
+from rig.build.mounts.settings import CameraMount, Setting
 from solver.limits import Limits
-from common.progress import CancelToken
 from solver.result import ConstraintRow
 
 WIDEST_MM = 20.0

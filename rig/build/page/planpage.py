@@ -6,31 +6,18 @@ import json
 from importlib.resources import files
 from typing import Any
 
+from common.files.plain import number
+from common.page.document import drawn_page, style_sheet
+from common.page.html import element, esc, figure_text, percent, plot, section, table
 from geometry.raycast import Occluder
-from rig.build.drawings.figures import (
-    POSE_COLUMNS,
-    mm,
-    pose_figures,
-    setting_text,
-)
+from rig.build.drawings.figures import POSE_COLUMNS, mm, pose_figures, setting_text
 from rig.build.drawings.steps import plain_steps
 from rig.build.drawings.views import plan_solids
-from common.files.plain import number
 from rig.build.mounts.plan import MountPlan
 from rig.build.mounts.settings import CameraMount
+from rig.build.page.planview import plan_figure
 from rig.build.parts.bill import Bill
 from rig.build.parts.cuts import Cut
-from common.page.html import (
-    element,
-    esc,
-    figure_text,
-    percent,
-    plot,
-    section,
-    table,
-)
-from common.page.document import drawn_page, style_sheet
-from rig.build.page.planview import plan_figure
 
 FIGURE = "plan-3d"
 CONTENTS = (

@@ -8,10 +8,7 @@ from typing import TYPE_CHECKING
 from geometry.raycast import Occluder
 from rig.build.drawings.views import plan_solids
 from rig.build.mounts.plan import MountPlan
-from rig.report.scene import (
-    GLTF_FROM_RIG,
-    scene_glb,
-)
+from rig.report.scene import GLTF_FROM_RIG, scene_glb
 
 if TYPE_CHECKING:
     import trimesh

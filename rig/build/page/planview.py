@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from common.page.html import esc
 from geometry.arrays import Floats
 from geometry.raycast import Occluder
+from geometry.viewmesh import simplified
 from rig.build.mounts.plan import MountPlan
 from rig.build.mounts.structure import Solid
 from rig.report.colours import BODY, FIXED, LENS, SKIN
-from common.page.html import esc
 from rig.report.three import mesh_trace, scene_layout
-from geometry.viewmesh import simplified
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go

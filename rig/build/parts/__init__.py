@@ -1,24 +1,8 @@
 """What to buy, cut and print for a mount plan: bill of materials, cut list, joints."""
 
-from rig.build.parts.bill import (
-    Bill,
-    BillLine,
-    Prices,
-    bill_of_materials,
-    must_be_known,
-)
-from rig.build.parts.cuts import (
-    Cut,
-    cut_list,
-)
-from rig.build.parts.tables import (
-    bill_csv,
-    bill_json,
-    cuts_csv,
-    cuts_json,
-    joints_csv,
-    joints_json,
-)
+from rig.build.parts.bill import Bill, BillLine, Prices, bill_of_materials, must_be_known
+from rig.build.parts.cuts import Cut, cut_list
+from rig.build.parts.tables import bill_csv, bill_json, cuts_csv, cuts_json, joints_csv, joints_json
 
 __all__ = [
     "Bill",

@@ -10,15 +10,12 @@ from typing import Any
 
 import numpy as np
 
+from common.errors import InputError, NotFoundError
 from geometry.arrays import Floats
 from geometry.camera import RigCamera
-from common.errors import (
-    InputError,
-    NotFoundError,
-)
-from rig.catalogue.catalogue import Catalogue
 from rig.build.mounts.plan import MountPlan
 from rig.build.mounts.structure import Plate
+from rig.catalogue.catalogue import Catalogue
 
 PRINT_DENSITY_G_PER_CM3 = 1.27
 """PETG, printed solid: an upper bound of what a wedge weighs."""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rig.catalogue.catalogue import Catalogue
 from rig.build.mounts.plan import MountPlan
 from rig.build.mounts.structure import Member
+from rig.catalogue.catalogue import Catalogue
 
 SAME_LENGTH_MM = 0.05
 """Half of the tenth of a millimetre that lengths are stated to."""

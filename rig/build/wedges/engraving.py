@@ -8,10 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from geometry.arrays import Floats
-from rig.build.wedges.lettering import (
-    Words,
-    words,
-)
+from rig.build.wedges.lettering import Words, words
 from rig.build.wedges.shape import facets
 
 ENGRAVED_MM = 0.6

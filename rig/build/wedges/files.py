@@ -48,6 +48,4 @@ def _same_each_time(package: bytes) -> bytes:
 def _numbered(content: bytes) -> bytes:
     """A file of the package whose identifiers are counted from 1."""
     counted = itertools.count(1)
-    return UUID.sub(
-        lambda _: b'UUID="%s"' % str(uuid.UUID(int=next(counted))).encode(), content
-    )
+    return UUID.sub(lambda _: b'UUID="%s"' % str(uuid.UUID(int=next(counted))).encode(), content)

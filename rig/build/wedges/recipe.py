@@ -10,24 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from geometry.arrays import Floats
-from rig.build.wedges.engraving import (
-    ENGRAVED_MM,
-    Engraving,
-)
-from rig.build.wedges.fastenings import (
-    Room,
-    room_for,
-)
-from rig.build.wedges.shape import (
-    FLANGE_MM,
-    SEAT_MM,
-    WedgeShape,
-)
+from rig.build.mounts.structure import Hole, Wedge
+from rig.build.wedges.engraving import ENGRAVED_MM, Engraving
+from rig.build.wedges.fastenings import Room, room_for
+from rig.build.wedges.shape import FLANGE_MM, SEAT_MM, WedgeShape
 from rig.catalogue.catalogue import Catalogue
-from rig.build.mounts.structure import (
-    Hole,
-    Wedge,
-)
 
 CLEARANCE_MM = 0.6
 """By how much a pocket is wider than what goes in: printed holes come out a little small."""

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from geometry.arrays import Floats
 from common.errors import InputError
+from geometry.arrays import Floats
 from rig.build.mounts.structure import Wedge
 
 if TYPE_CHECKING:

@@ -6,29 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from common.errors import InputError, InternalError
 from geometry.arrays import Floats
-from common.errors import (
-    InputError,
-    InternalError,
-)
-from rig.build.wedges.engraving import (
-    ENGRAVED_MM,
-    engravings,
-)
-from rig.build.wedges.recipe import (
-    Bearing,
-    Recess,
-    PrintPart,
-    engraved,
-    screw_cuts,
-)
-from rig.build.wedges.shape import (
-    BED_MM,
-    WedgeShape,
-    shapes_of,
-)
-from rig.catalogue.catalogue import Catalogue
 from rig.build.mounts.structure import Wedge
+from rig.build.wedges.engraving import ENGRAVED_MM, engravings
+from rig.build.wedges.recipe import Bearing, PrintPart, Recess, engraved, screw_cuts
+from rig.build.wedges.shape import BED_MM, WedgeShape, shapes_of
+from rig.catalogue.catalogue import Catalogue
 
 if TYPE_CHECKING:
     import trimesh

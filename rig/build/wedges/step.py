@@ -8,12 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from geometry.arrays import Floats
 from common.errors import InputError
-from rig.build.wedges.recipe import (
-    Recess,
-    PrintPart,
-)
+from geometry.arrays import Floats
+from rig.build.wedges.recipe import PrintPart, Recess
 from rig.build.wedges.shape import facets
 
 if TYPE_CHECKING:

@@ -15,26 +15,15 @@ import trimesh
 from plans import plate_plan, tslot_plan
 from rigs import ellipsoid_mesh
 
-from common.errors import (
-    CancelledError,
-    ConflictError,
-    InputError,
-)
+from common.errors import CancelledError, ConflictError, InputError
 from common.progress import Progress
 from geometry.raycast import Occluder
+from rig.build.folder.planfiles import MEDIA_TYPES, PlanOptions, plan_files
+from rig.build.folder.planfolder import MANIFEST, write_plan
 from rig.build.mounts.plan import MountPlan
 from rig.build.mounts.planfile import read_plan
-from rig.build.parts import Prices
-from rig.build.folder.planfiles import (
-    MEDIA_TYPES,
-    PlanOptions,
-    plan_files,
-)
-from rig.build.folder.planfolder import (
-    MANIFEST,
-    write_plan,
-)
 from rig.build.page.planscene import plan_glb
+from rig.build.parts import Prices
 
 
 @cache

@@ -16,16 +16,9 @@ import pytest
 from plans import plate_plan, tslot_plan
 
 from rig.build.drawings.views import plan_solids
-from rig.build.mounts.plan import (
-    Clash,
-    MountPlan,
-)
+from rig.build.mounts.plan import Clash, MountPlan
 from rig.build.page.planpage import render_plan_page
-from rig.build.parts import (
-    Prices,
-    bill_of_materials,
-    cut_list,
-)
+from rig.build.parts import Prices, bill_of_materials, cut_list
 from rig.catalogue import load_catalogue
 
 if TYPE_CHECKING:

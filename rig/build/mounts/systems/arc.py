@@ -14,40 +14,18 @@ from typing import Self
 
 import numpy as np
 
+from common.errors import InputError
 from geometry.arrays import Floats
 from geometry.camera import RigCamera
-from common.errors import InputError
 from rig.build.mounts.clashes import pairs
-from rig.build.mounts.settings import (
-    CameraMount,
-    Tape,
-)
-from rig.build.mounts.solids import (
-    bar,
-    camera_solids,
-    lens_front,
-)
-from rig.build.mounts.structure import (
-    Joint,
-    Member,
-    Solid,
-    Structure,
-)
+from rig.build.mounts.settings import CameraMount, Tape
+from rig.build.mounts.solids import bar, camera_solids, lens_front
+from rig.build.mounts.structure import Joint, Member, Solid, Structure
 from rig.build.mounts.surroundings import Surroundings
 from rig.build.mounts.systems.base import Built
-from rig.build.mounts.systems.hanging import (
-    Rail,
-    hang_all,
-)
-from rig.build.mounts.systems.outrigger import (
-    Hung,
-    Outrigger,
-    Z,
-)
-from rig.build.mounts.systems.ribs import (
-    Facet,
-    Rib,
-)
+from rig.build.mounts.systems.hanging import Rail, hang_all
+from rig.build.mounts.systems.outrigger import Hung, Outrigger, Z
+from rig.build.mounts.systems.ribs import Facet, Rib
 
 BEHIND_MM = 90.0
 END_DEG = 10.0

@@ -8,38 +8,21 @@ from itertools import product
 
 import numpy as np
 
+from common.errors import InputError
 from geometry.arrays import Floats
 from geometry.camera import RigCamera
-from common.errors import InputError
 from geometry.frames import Pose
+from rig.build.mounts.kinematics import PLATE_FROM_CAMERA, head_angles, rotated, turned_over
+from rig.build.mounts.settings import turn
+from rig.build.mounts.solids import camera_solids, carried
+from rig.build.mounts.structure import Hole, Wedge
+from rig.build.mounts.systems.footing import BaseFooting, clear_footing
 from rig.build.wedges import print_part
 from rig.build.wedges.fastenings import room_for
 from rig.build.wedges.shape import SEAT_MM
 from rig.catalogue import Catalogue
 from rig.catalogue.items import Profile
-from rig.solids.convex import (
-    box_corners,
-    cylinder_corners,
-)
-from rig.build.mounts.kinematics import (
-    PLATE_FROM_CAMERA,
-    head_angles,
-    rotated,
-    turned_over,
-)
-from rig.build.mounts.settings import turn
-from rig.build.mounts.solids import (
-    camera_solids,
-    carried,
-)
-from rig.build.mounts.structure import (
-    Hole,
-    Wedge,
-)
-from rig.build.mounts.systems.footing import (
-    BaseFooting,
-    clear_footing,
-)
+from rig.solids.convex import box_corners, cylinder_corners
 
 _, Y, Z = np.eye(3)
 LEAST_SEAT_MM = 12.0

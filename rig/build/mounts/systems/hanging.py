@@ -6,34 +6,17 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Protocol
 
+from common.errors import InputError
 from geometry.arrays import Floats
 from geometry.camera import RigCamera
-from common.errors import InputError
-from rig.build.mounts.clashes import (
-    Joined,
-    Site,
-    pairs,
-)
+from rig.build.mounts.clashes import Joined, Site, pairs
 from rig.build.mounts.kinematics import reach
-from rig.build.mounts.settings import (
-    CameraMount,
-    Link,
-    Setting,
-    chain_pose,
-)
+from rig.build.mounts.settings import CameraMount, Link, Setting, chain_pose
 from rig.build.mounts.solids import camera_solids
 from rig.build.mounts.structure import Solid
 from rig.build.mounts.surroundings import Surroundings
-from rig.build.mounts.systems.heads import (
-    Stance,
-    stances,
-)
-from rig.build.mounts.systems.outrigger import (
-    FOOTINGS,
-    HeadFooting,
-    Hung,
-    Outrigger,
-)
+from rig.build.mounts.systems.heads import Stance, stances
+from rig.build.mounts.systems.outrigger import FOOTINGS, HeadFooting, Hung, Outrigger
 
 ROOM_MM = 14.0
 """Room kept while mounts are arranged: rounding an angle by half a degree moves a camera

@@ -8,28 +8,17 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
+from common.errors import InputError
 from geometry.arrays import Floats
 from geometry.camera import RigCamera
-from common.errors import InputError
 from geometry.frames import Pose
+from rig.build.mounts.kinematics import ANGLES, frames_along, head_angles, head_links, turned_over
+from rig.build.mounts.settings import CameraMount, Link, Setting, shift
+from rig.build.mounts.solids import round_part
+from rig.build.mounts.structure import Solid
 from rig.catalogue import Catalogue
 from rig.catalogue.catalogue import pick
 from rig.catalogue.items import Head
-from rig.build.mounts.kinematics import (
-    ANGLES,
-    frames_along,
-    head_angles,
-    head_links,
-    turned_over,
-)
-from rig.build.mounts.settings import (
-    CameraMount,
-    Link,
-    Setting,
-    shift,
-)
-from rig.build.mounts.solids import round_part
-from rig.build.mounts.structure import Solid
 
 PLATE_MM = 8.0
 """Thickness of the disk under the camera, and how far it may be turned past a round figure."""

@@ -14,35 +14,12 @@ import numpy as np
 
 from geometry.arrays import Floats
 from geometry.camera import RigCamera
+from rig.build.mounts.kinematics import frames_along, rotated, standing
+from rig.build.mounts.settings import CameraMount, Link, Motion, Setting, shift, turn
+from rig.build.mounts.solids import bar, box, carried
+from rig.build.mounts.structure import Joint, Member, PlacedPart, Solid
+from rig.build.mounts.systems.heads import HeadKind, head_id
 from rig.catalogue.items import Bracket, Profile
-from rig.build.mounts.kinematics import (
-    frames_along,
-    rotated,
-    standing,
-)
-from rig.build.mounts.settings import (
-    CameraMount,
-    Link,
-    Motion,
-    Setting,
-    shift,
-    turn,
-)
-from rig.build.mounts.solids import (
-    bar,
-    box,
-    carried,
-)
-from rig.build.mounts.structure import (
-    Joint,
-    Member,
-    PlacedPart,
-    Solid,
-)
-from rig.build.mounts.systems.heads import (
-    HeadKind,
-    head_id,
-)
 
 X, Y, Z = np.eye(3)
 FACES: tuple[tuple[str, Floats], ...] = (("top", Z), ("under", -Z), ("right", X), ("left", -X))

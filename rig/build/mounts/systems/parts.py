@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from common.errors import InputError
-from rig.catalogue import Catalogue
-from rig.catalogue.catalogue import pick
-from rig.catalogue.items import Bracket, Profile
 from rig.build.mounts.systems.heads import HeadKind
 from rig.build.mounts.systems.outrigger import Outrigger
 from rig.build.mounts.systems.plate import PlateSystem
+from rig.catalogue import Catalogue
+from rig.catalogue.catalogue import pick
+from rig.catalogue.items import Bracket, Profile
 
 
 def profile_named(wanted: str, catalogue: Catalogue) -> Profile:

@@ -16,55 +16,21 @@ from typing import Self
 
 import numpy as np
 
+from common.errors import InputError
 from geometry.arrays import Floats
 from geometry.camera import RigCamera
-from common.errors import InputError
-from rig.catalogue import Catalogue
-from rig.catalogue.items import Bracket, Profile
-from rig.build.mounts.clashes import (
-    Site,
-    pairs,
-)
+from rig.build.mounts.clashes import Site, pairs
 from rig.build.mounts.kinematics import rotated
-from rig.build.mounts.settings import (
-    CameraMount,
-    Tape,
-)
-from rig.build.mounts.solids import (
-    bar,
-    box,
-    camera_solids,
-    carried,
-    lens_front,
-)
-from rig.build.mounts.structure import (
-    Hole,
-    Joint,
-    Member,
-    PlacedPart,
-    Plate,
-    Structure,
-)
+from rig.build.mounts.settings import CameraMount, Tape
+from rig.build.mounts.solids import bar, box, camera_solids, carried, lens_front
+from rig.build.mounts.structure import Hole, Joint, Member, PlacedPart, Plate, Structure
 from rig.build.mounts.surroundings import Surroundings
 from rig.build.mounts.systems.base import Built
-from rig.build.mounts.systems.fits import (
-    CAMERA_SCREW,
-    SCREW_HOLES_MM,
-    WedgeFit,
-    Fitter,
-)
-from rig.build.mounts.systems.posts import (
-    LONGEST_POST_MM,
-    Posted,
-    X,
-    Y,
-    Z,
-    post_for,
-)
-from rig.build.mounts.tolerancing import (
-    MADE_DEG,
-    MADE_MM,
-)
+from rig.build.mounts.systems.fits import CAMERA_SCREW, SCREW_HOLES_MM, Fitter, WedgeFit
+from rig.build.mounts.systems.posts import LONGEST_POST_MM, Posted, X, Y, Z, post_for
+from rig.build.mounts.tolerancing import MADE_DEG, MADE_MM
+from rig.catalogue import Catalogue
+from rig.catalogue.items import Bracket, Profile
 
 PLATE_AXES = np.stack([-X, Z, Y], axis=1)
 """Seen from the subject: x to the right, y up, z out of the plate towards the subject."""
@@ -131,7 +97,9 @@ class PlateSystem:
         origin[1] = float(np.floor(min(behind, *ends) - SPARE_MM))
         return rotated(PLATE_AXES, origin)
 
-    def _best(self, camera: RigCamera, found: Iterable[WedgeFit], face: Floats, site: Site) -> Posted:
+    def _best(
+        self, camera: RigCamera, found: Iterable[WedgeFit], face: Floats, site: Site
+    ) -> Posted:
         """The first post and wedge without a clash, else the one with the fewest."""
         best: tuple[int, Posted] | None = None
         for fit in found:

@@ -8,32 +8,12 @@ import numpy as np
 
 from geometry.arrays import Floats
 from geometry.camera import RigCamera
-from rig.catalogue.items import Profile
-from rig.build.mounts.kinematics import (
-    ANGLES,
-    frame,
-    frames_along,
-    head_links,
-    reach,
-)
-from rig.build.mounts.settings import (
-    CameraMount,
-    Link,
-    Motion,
-    Setting,
-    chain_pose,
-    shift,
-)
-from rig.build.mounts.solids import (
-    bar,
-    carried,
-)
-from rig.build.mounts.structure import (
-    Member,
-    Solid,
-    Wedge,
-)
+from rig.build.mounts.kinematics import ANGLES, frame, frames_along, head_links, reach
+from rig.build.mounts.settings import CameraMount, Link, Motion, Setting, chain_pose, shift
+from rig.build.mounts.solids import bar, carried
+from rig.build.mounts.structure import Member, Solid, Wedge
 from rig.build.mounts.systems.fits import WedgeFit
+from rig.catalogue.items import Profile
 
 X, Y, Z = np.eye(3)
 LONGEST_POST_MM = 1500.0

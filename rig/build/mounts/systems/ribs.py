@@ -8,21 +8,12 @@ from functools import cached_property
 import numpy as np
 
 from geometry.arrays import Floats
-from rig.catalogue.items import Profile
 from rig.build.mounts.kinematics import frame
-from rig.build.mounts.settings import (
-    Link,
-    Motion,
-    Setting,
-    shift,
-    turn,
-)
+from rig.build.mounts.settings import Link, Motion, Setting, shift, turn
 from rig.build.mounts.solids import bar
-from rig.build.mounts.structure import (
-    Member,
-    Solid,
-)
+from rig.build.mounts.structure import Member, Solid
 from rig.build.mounts.systems.outrigger import Z
+from rig.catalogue.items import Profile
 
 CORNER_MM = 20.0
 """How far from a corner of the polygon stubs stay, for the joint."""

@@ -9,20 +9,11 @@ from typing import Self
 
 import numpy as np
 
+from common.errors import InputError
 from geometry.arrays import Floats
 from geometry.camera import RigCamera
-from common.errors import InputError
-from rig.catalogue.items import Bracket
-from rig.build.mounts.clashes import (
-    Site,
-    pairs,
-)
-from rig.build.mounts.kinematics import (
-    frames_along,
-    reach,
-    rotated,
-    standing,
-)
+from rig.build.mounts.clashes import Site, pairs
+from rig.build.mounts.kinematics import frames_along, reach, rotated, standing
 from rig.build.mounts.settings import (
     CameraMount,
     Link,
@@ -33,25 +24,12 @@ from rig.build.mounts.settings import (
     shift,
     turn,
 )
-from rig.build.mounts.solids import (
-    bar,
-    camera_solids,
-    lens_front,
-)
-from rig.build.mounts.structure import (
-    Joint,
-    PlacedPart,
-    Solid,
-    Structure,
-)
+from rig.build.mounts.solids import bar, camera_solids, lens_front
+from rig.build.mounts.structure import Joint, PlacedPart, Solid, Structure
 from rig.build.mounts.surroundings import Surroundings
 from rig.build.mounts.systems.base import Built
-from rig.build.mounts.systems.heads import (
-    HeadKind,
-    Stance,
-    head_id,
-    stances,
-)
+from rig.build.mounts.systems.heads import HeadKind, Stance, head_id, stances
+from rig.catalogue.items import Bracket
 
 X, Y, Z = np.eye(3)
 COLUMN_MM = 30.0

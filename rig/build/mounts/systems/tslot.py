@@ -15,43 +15,16 @@ import numpy as np
 
 from geometry.arrays import Floats
 from geometry.camera import RigCamera
-from rig.catalogue.items import Profile
 from rig.build.mounts.clashes import pairs
 from rig.build.mounts.kinematics import rotated
-from rig.build.mounts.settings import (
-    CameraMount,
-    Link,
-    Motion,
-    Setting,
-    Tape,
-    shift,
-    turn,
-)
-from rig.build.mounts.solids import (
-    bar,
-    camera_solids,
-    lens_front,
-)
-from rig.build.mounts.structure import (
-    Joint,
-    Member,
-    Solid,
-    Structure,
-)
+from rig.build.mounts.settings import CameraMount, Link, Motion, Setting, Tape, shift, turn
+from rig.build.mounts.solids import bar, camera_solids, lens_front
+from rig.build.mounts.structure import Joint, Member, Solid, Structure
 from rig.build.mounts.surroundings import Surroundings
 from rig.build.mounts.systems.base import Built
-from rig.build.mounts.systems.hanging import (
-    Rail,
-    hang_all,
-    spread_order,
-)
-from rig.build.mounts.systems.outrigger import (
-    Hung,
-    Outrigger,
-    X,
-    Y,
-    Z,
-)
+from rig.build.mounts.systems.hanging import Rail, hang_all, spread_order
+from rig.build.mounts.systems.outrigger import Hung, Outrigger, X, Y, Z
+from rig.catalogue.items import Profile
 
 BEHIND_MM = 90.0
 """From the rearmost cable of a bay to the middle of its uprights: room for stubs."""

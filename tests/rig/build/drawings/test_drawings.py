@@ -28,17 +28,9 @@ from rig.build.drawings import (
     view_sheets,
 )
 from rig.build.drawings.annotate import spread
-from rig.build.drawings.figures import (
-    fixed,
-    setting_text,
-)
+from rig.build.drawings.figures import fixed, setting_text
 from rig.build.drawings.frame import fitted
-from rig.build.drawings.items import (
-    Dimension,
-    Line,
-    Text,
-    dimension_parts,
-)
+from rig.build.drawings.items import Dimension, Line, Text, dimension_parts
 from rig.build.drawings.pdf import text_width_mm
 from rig.build.mounts.settings import Setting
 
@@ -119,7 +111,8 @@ def test_texts_can_be_read(sheets: tuple[Sheet, ...]) -> None:
 @pytest.mark.slow
 def test_equal_plans_give_equal_files_in_another_process() -> None:
     code = (
-        "import hashlib, plans; from rig.build.drawings import *; s = view_sheets(plans.tslot_plan(2));"
+        "import hashlib, plans; from rig.build.drawings import *;"
+        "s = view_sheets(plans.tslot_plan(2));"
         "print(*(hashlib.sha256(b).hexdigest() for b in "
         "(dxf_bytes(s), svg_bytes(s, 'x'), pdf_bytes(s, 'x'))))"
     )

@@ -19,11 +19,7 @@ from rig.build.mounts.kinematics import (
     standing,
     turned_over,
 )
-from rig.build.mounts.settings import (
-    Link,
-    Motion,
-    chain_pose,
-)
+from rig.build.mounts.settings import Link, Motion, chain_pose
 
 FACES = ([0.0, 0.0, 1.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [-1.0, 0.0, 0.0])
 AXES = np.eye(3)

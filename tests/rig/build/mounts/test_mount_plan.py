@@ -11,18 +11,11 @@ import numpy as np
 import pytest
 from rigs import face, face_cameras, face_limits
 
-from common.errors import (
-    CancelledError,
-    InputError,
-)
+from common.errors import CancelledError, InputError
 from common.progress import Progress
 from rig.build.mounts.making import make_plan
 from rig.build.mounts.plan import MountPlan
-from rig.build.mounts.planfile import (
-    plan_document,
-    plan_from_mapping,
-    read_plan,
-)
+from rig.build.mounts.planfile import plan_document, plan_from_mapping, read_plan
 from rig.build.mounts.systemfile import parse_system
 from solver.quality import evaluate
 

@@ -12,26 +12,13 @@ from rigs import compact_camera, face, face_cameras, face_limits
 from common.errors import InputError
 from geometry.camera import RigCamera
 from geometry.frames import Pose
-from rig.build.mounts.clashes import (
-    Site,
-    find_clashes,
-    pairs,
-)
+from rig.build.mounts.clashes import Site, find_clashes, pairs
 from rig.build.mounts.kinematics import turned_over
-from rig.build.mounts.solids import (
-    camera_solids,
-    round_part,
-)
+from rig.build.mounts.solids import camera_solids, round_part
 from rig.build.mounts.structure import Structure
-from rig.build.mounts.surroundings import (
-    Surroundings,
-    head_entry,
-)
+from rig.build.mounts.surroundings import Surroundings, head_entry
 from rig.build.mounts.systemfile import parse_system
-from rig.build.mounts.systems.base import (
-    Built,
-    Holding,
-)
+from rig.build.mounts.systems.base import Built, Holding
 
 KINDS = ("t-slot", "plate", "arc", "tripods")
 

@@ -6,16 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from common.errors import (
-    InputError,
-    NotFoundError,
-    RigwrightError,
-)
-from rig.build.mounts.systemfile import (
-    SystemFile,
-    parse_system,
-    read_system,
-)
+from common.errors import InputError, NotFoundError, RigwrightError
+from rig.build.mounts.systemfile import SystemFile, parse_system, read_system
 from rig.build.mounts.systems.arc import ArcSystem
 from rig.build.mounts.systems.plate import PlateSystem
 from rig.build.mounts.systems.tripods import TripodSystem

@@ -12,10 +12,7 @@ from geometry.camera import RigCamera
 from geometry.frames import Pose
 from rig.build.mounts.linear import LinearModel
 from rig.build.mounts.making import make_plan
-from rig.build.mounts.network import (
-    MountNetwork,
-    relative_slack,
-)
+from rig.build.mounts.network import MountNetwork, relative_slack
 from rig.build.mounts.plan import MountPlan
 from rig.build.mounts.systemfile import parse_system
 from solver.limits import BaseHeight, Coverage, CoverageTier, Limits

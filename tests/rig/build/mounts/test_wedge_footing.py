@@ -17,24 +17,13 @@ from rig.build.mounts.settings import turn
 from rig.build.mounts.solids import carried
 from rig.build.mounts.steps import assembly_steps
 from rig.build.mounts.structure import Wedge
-from rig.build.mounts.surroundings import (
-    Surroundings,
-    head_entry,
-)
+from rig.build.mounts.surroundings import Surroundings, head_entry
 from rig.build.mounts.systemfile import parse_system
 from rig.build.mounts.systems.base import Built
-from rig.build.wedges import (
-    wedge_mesh,
-    overhang_deg,
-    print_part,
-)
+from rig.build.wedges import overhang_deg, print_part, wedge_mesh
 from rig.build.wedges.fastenings import room_for
 from rig.catalogue import load_catalogue
-from rig.solids.convex import (
-    box_corners,
-    cylinder_corners,
-    signed_distance,
-)
+from rig.solids.convex import box_corners, cylinder_corners, signed_distance
 
 CATALOGUE = load_catalogue()
 KEY_MM = 1000.0

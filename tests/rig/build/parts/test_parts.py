@@ -11,10 +11,7 @@ import numpy as np
 import pytest
 from plans import plate_plan, tslot_plan
 
-from common.errors import (
-    InputError,
-    NotFoundError,
-)
+from common.errors import InputError, NotFoundError
 from rig.build.mounts.plan import MountPlan
 from rig.build.mounts.structure import Member
 from rig.build.parts import (

@@ -16,19 +16,16 @@ from plans import AIMS, Aim, frame, wedge_of
 
 from common.errors import InputError
 from rig.build.mounts.settings import turn
-from rig.build.mounts.structure import (
-    Hole,
-    Wedge,
-)
+from rig.build.mounts.structure import Hole, Wedge
 from rig.build.wedges import (
     PrintPart,
+    overhang_deg,
+    print_part,
     wedge_3mf,
+    wedge_corners_mm,
     wedge_mesh,
     wedge_step,
     wedge_stl,
-    overhang_deg,
-    print_part,
-    wedge_corners_mm,
 )
 from rig.build.wedges.fastenings import room_for
 from rig.build.wedges.lettering import words

@@ -1,0 +1,1 @@
+"""A mount plan as a page and as a scene."""
