@@ -77,6 +77,8 @@ class CameraCapabilities:
     exposure_start_delay_us: float | None = None
     settable: frozenset[str] = frozenset()
     """Names of the fields of :class:`CameraSettings` that it obeys."""
+    by_files: bool = False
+    """Whether its pictures are files of another program, which may be of any shot."""
     wait_overrun_s: float = 0.0
     """How much longer than its timeout :meth:`CameraDevice.wait_frames` may take.
 

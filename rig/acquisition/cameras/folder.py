@@ -6,12 +6,15 @@ and it has all that its header promises.
 
 from __future__ import annotations
 
+import hashlib
 import threading
 import time
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from stat import S_ISREG
 from typing import Annotated, Literal
 
 from pydantic import Field
@@ -55,15 +58,38 @@ class FolderOptions(StrictModel):
     """``edge`` where the trigger box fires these cameras by cable."""
 
 
+def owned(options: FolderOptions, camera_id: str) -> str:
+    """What a camera has to itself, in words: its folder, or a body's files below the root."""
+    root = Path(options.root).expanduser()
+    key = options.cameras.get(camera_id, camera_id)
+    if options.by == "folder":
+        return f"folder {(root / key).resolve()}"
+    return f"files of body {key} in folder {root.resolve()}"
+
+
+def _require_different(options: FolderOptions) -> None:
+    """Raise :class:`InputError` where one folder, or one body, is two cameras."""
+    seen: dict[str, str] = {}
+    for name in options.cameras:
+        other = seen.setdefault(owned(options, name), name)
+        if other != name:
+            raise InputError(
+                "camera-option",
+                f"cameras '{other}' and '{name}' have the same {owned(options, name)}",
+                "give each its own in the option 'cameras'",
+            )
+
+
 @dataclass(frozen=True)
 class Stamp:
-    """What changes when a file is written to."""
+    """What changes when a file is written to, and what stays when it is renamed."""
 
     size: int
     modified_ns: int
+    node: tuple[int, int] = (0, 0)
 
 
-class Watch:
+class FolderWatch:
     """The files below a folder, looked at by name and time; remembers what it read of them."""
 
     def __init__(self, root: Path, suffixes: Sequence[str]) -> None:
@@ -71,7 +97,27 @@ class Watch:
         self._suffixes = tuple(s.lower() for s in suffixes) or tuple(MEDIA_TYPES)
         self._whole: dict[tuple[Path, Stamp], bool] = {}
         self._tags: dict[tuple[Path, Stamp], Mapping[str, str]] = {}
+        self._contents: dict[tuple[Path, Stamp], str] = {}
+        self._seen: dict[str, str] = {}
         self._lock = threading.Lock()
+
+    def content(self, path: Path, stamp: Stamp) -> str:
+        """The checksum of a file's bytes."""
+        with self._lock:
+            if (path, stamp) not in self._contents:
+                self._contents[path, stamp] = hashlib.sha256(path.read_bytes()).hexdigest()
+            return self._contents[path, stamp]
+
+    def seen(self, content: str) -> str:
+        """The file that had this content in an earlier shot, empty when none did."""
+        with self._lock:
+            return self._seen.get(content, "")
+
+    def see(self, contents: Mapping[str, str]) -> None:
+        """Remember contents, and the names of their files, as those of earlier shots."""
+        with self._lock:
+            for content, name in contents.items():
+                self._seen.setdefault(content, name)
 
     def files(self, below: Path) -> dict[Path, Stamp]:
         """Picture files and their stamps. OSError when the folder is not there."""
@@ -84,7 +130,21 @@ class Watch:
                 stat = path.stat()
             except OSError:  # renamed or removed by its program just now
                 continue
-            found[path] = Stamp(stat.st_size, stat.st_mtime_ns)
+            if not S_ISREG(stat.st_mode):
+                # Reading a pipe or a socket waits for ever.
+                continue
+            found[path] = Stamp(stat.st_size, stat.st_mtime_ns, (stat.st_dev, stat.st_ino))
+        return found
+
+    def unfinished(self, below: Path) -> dict[tuple[int, int], str]:
+        """Files of other names, by what stays when they are renamed: pictures that are to be."""
+        found = {}
+        for path in below.rglob("*"):
+            if path.suffix.lower() not in self._suffixes or path.name.startswith("."):
+                with suppress(OSError):
+                    stat = path.lstat()
+                    if S_ISREG(stat.st_mode):
+                        found[stat.st_dev, stat.st_ino] = path.name
         return found
 
     def whole(self, path: Path, stamp: Stamp) -> bool:
@@ -106,10 +166,15 @@ class Watch:
 class FolderCamera:
     """One camera whose files arrive in a folder; a :class:`CameraDevice`."""
 
-    def __init__(self, watch: Watch, options: FolderOptions, info: CameraInfo, key: str) -> None:
+    def __init__(
+        self, watch: FolderWatch, options: FolderOptions, info: CameraInfo, key: str
+    ) -> None:
         self._watch, self._options, self._info, self._key = watch, options, info, key
         self._below = watch.root / key if options.by == "folder" else watch.root
         self._known: dict[Path, Stamp | None] = {}
+        self._before: dict[Path, Stamp | None] = {}
+        self._nodes: dict[Path, tuple[int, int]] = {}
+        self._unfinished_then: dict[tuple[int, int], str] = {}
         self._settling: dict[Path, tuple[Stamp, float]] = {}
         self._frames: list[Frame] = []
         self._armed = False
@@ -129,6 +194,7 @@ class FolderCamera:
             trigger=TriggerKind(self._options.trigger),
             timestamps=TimestampKind.NONE,
             frame_counter=False,
+            by_files=True,
         )
 
     def configure(self, settings: CameraSettings) -> CameraSettings:
@@ -147,6 +213,7 @@ class FolderCamera:
             files = self._watch.files(self._below)
         except OSError as error:
             raise self._gone(error) from None
+        self._nodes = {path: stamp.node for path, stamp in files.items()}
         return {p: s if self._watch.whole(p, s) else None for p, s in files.items()}
 
     def _gone(self, error: OSError | None = None) -> DeviceError:
@@ -162,6 +229,7 @@ class FolderCamera:
         if self._closed:
             raise self._gone()
         present = self._look()
+        self._watch.see({f.metadata["sha256"]: f.metadata["file"] for f in self._frames})
         fetched = {frame.metadata["path"] for frame in self._frames}
         self._counts["stale_frames"] += sum(
             self._is_new(path, stamp) and str(path) not in fetched
@@ -169,6 +237,8 @@ class FolderCamera:
             if stamp is not None and self._is_mine(path, stamp)
         )
         self._known, self._frames, self._armed = present, [], True
+        self._before = dict(present)
+        self._unfinished_then = self._watch.unfinished(self._below)
         self._settling.clear()
 
     def _is_new(self, path: Path, stamp: Stamp) -> bool:
@@ -225,6 +295,9 @@ class FolderCamera:
 
     def _take(self, path: Path, stamp: Stamp) -> None:
         tags = self._watch.tags(path, stamp)
+        content = self._watch.content(path, stamp)
+        known_as = self._renamed(path, stamp) or self._watch.seen(content)
+        known_as = known_as or self._copied(path, stamp, content)
         self._frames.append(
             Frame(
                 camera_id=self._info.id,
@@ -233,10 +306,39 @@ class FolderCamera:
                 encoded=path.read_bytes(),
                 media_type=MEDIA_TYPES[path.suffix.lower()],
                 exposure_us=exposure_us(tags),
-                metadata={**tags, "file": path.name, "path": str(path)},
+                metadata={
+                    **tags,
+                    "file": path.name,
+                    "path": str(path),
+                    "sha256": content,
+                    **({"known_as": known_as} if known_as else {}),
+                },
             )
         )
         self._counts["frames"] += 1
+
+    def _renamed(self, path: Path, stamp: Stamp) -> str:
+        """The name a file had when the camera was armed, empty for one that was not there."""
+        for former, known in self._before.items():
+            if former == path or former.exists():
+                continue
+            # Half there then, whole now under another name; or moved as it was.
+            if known == stamp or (known is None and self._nodes.get(former) == stamp.node):
+                return former.name
+        # A half under another name when the camera was armed is of an earlier shot.
+        return self._unfinished_then.get(stamp.node, "")
+
+    def _copied(self, path: Path, stamp: Stamp, content: str) -> str:
+        """The name of a file of before with the same bytes, empty when there is none."""
+        for former, known in self._before.items():
+            if known is None or known.size != stamp.size or former == path:
+                continue
+            try:
+                if self._watch.content(former, known) == content:
+                    return former.name
+            except OSError:  # gone since
+                continue
+        return ""
 
     def disarm(self) -> None:
         """Look at the folder no more."""
@@ -273,7 +375,8 @@ class FolderBackend:
             raise InputError(
                 "camera-option", f"there is no folder {root}", "correct the option 'root'"
             )
-        self._watch = Watch(root, self._options.suffixes)
+        _require_different(self._options)
+        self._watch = FolderWatch(root, self._options.suffixes)
         self._open: list[FolderCamera] = []
 
     def _keys(self) -> Mapping[str, str]:

@@ -15,8 +15,9 @@ from rig.acquisition.synchrony.cameraframes import CameraFrames, Method, Pairing
 from rig.acquisition.synchrony.capturedata import CameraPart, CaptureData
 from rig.acquisition.synchrony.clocks import ClockFitter, DeviceClock, TriggerTime, clock_jumped
 from rig.acquisition.synchrony.faults import Fault, FaultKind
+from rig.acquisition.synchrony.fileevidence import FileDelivery, FileEvidence, FiredShot
 from rig.acquisition.synchrony.imagechecks import image_faults, is_raw
-from rig.acquisition.synchrony.pairing import pair
+from rig.acquisition.synchrony.pairing import late_faults, pair
 from rig.acquisition.synchrony.swaps import swapped
 from rig.acquisition.synchrony.triggertimes import command_times, edge_times
 from rig.acquisition.trigger.box import FireOutcome
@@ -24,14 +25,23 @@ from rig.acquisition.trigger.box import FireOutcome
 Sizes = Mapping[str, tuple[int, int]]
 
 
-def pair_and_judge(station: Station, firing: Firing, fit: ClockFitter, sizes: Sizes) -> CaptureData:
+def pair_and_judge(
+    station: Station,
+    firing: Firing,
+    fit: ClockFitter,
+    sizes: Sizes,
+    files: FileEvidence | None = None,
+) -> CaptureData:
     """Pair and judge everything one firing gave. ``sizes``: what pictures must measure, by camera.
+
+    ``files``: what earlier captures taught of cameras that are only seen through their files.
 
     Raises :class:`DeviceError` ``trigger-unknown`` when nobody can tell whether the box fired,
     and no picture shows that it did.
     """
     shots = _shots_done(firing)
     parts = tuple(_part(station, firing, thread, fit, sizes, shots) for thread in firing.threads)
+    parts = _by_files(station, firing, parts, files or FileEvidence(), sizes)
     _require_fired(firing, parts)
     faults = [
         *firing.faults,
@@ -124,6 +134,51 @@ def _part(
     beside = _pair_if_shot(replace(received, frames=raws)) if pictures and raws else None
     return CameraPart(
         thread.plan, thread.device.info, ready.settings, received, paired, beside, samples
+    )
+
+
+def _by_files(
+    station: Station,
+    firing: Firing,
+    parts: tuple[CameraPart, ...],
+    evidence: FileEvidence,
+    sizes: Sizes,
+) -> tuple[CameraPart, ...]:
+    """The same with the files of cameras that are only seen through them given to their shots."""
+    wall_ns = round(firing.fired_at.timestamp() * 1e9) - firing.fired.middle_ns
+    given = [
+        _delivery(station, firing, part, wall_ns)
+        for part in parts
+        if part.received.capabilities.by_files and part.received.trigger_times
+    ]
+    found = evidence.sort(given)
+    done = []
+    for part in parts:
+        if part.plan.name in found:
+            pairing, raws = found[part.plan.name]
+            faults = (*pairing.faults, *late_faults(part.received, pairing.pairs))
+            judged = _judged(replace(pairing, faults=faults), sizes.get(part.plan.name))
+            problem = firing.collected[part.plan.name].problem
+            part = replace(part, pairing=_explained(judged, problem), raws=raws)
+        done.append(part)
+    return tuple(done)
+
+
+def _delivery(station: Station, firing: Firing, part: CameraPart, wall_ns: int) -> FileDelivery:
+    received, capture_id = part.received, firing.order.capture_id
+    first = received.trigger_times[0]
+    edge = received.capabilities.trigger is TriggerKind.EDGE
+    return FileDelivery(
+        camera=part.plan.name,
+        frames=firing.collected[part.plan.name].frames,
+        shots=tuple(
+            FiredShot(capture_id, t.shot, t.at_host_ns + wall_ns + round(received.lag_us * 1e3))
+            for t in received.trigger_times
+        ),
+        first_host_ns=first.at_host_ns - round(first.uncertainty_us * 1e3),
+        # Where somebody else fires, the shot is when that somebody pleases.
+        wait_ns=0 if edge else round(station.policy.frame_deadline_s * 1e9),
+        kinds=part.plan.kinds,
     )
 
 

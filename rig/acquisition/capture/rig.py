@@ -46,6 +46,7 @@ from rig.acquisition.synchrony.boards import station_board
 from rig.acquisition.synchrony.capturedata import CaptureData
 from rig.acquisition.synchrony.clocks import ClockFitter, fit_clock
 from rig.acquisition.synchrony.faults import Fault
+from rig.acquisition.synchrony.fileevidence import FileEvidence
 from rig.acquisition.synchrony.lags import with_new_timings
 from rig.acquisition.synchrony.verdict import Board, Evidence, gather
 from rig.acquisition.trigger.box import TriggerBox
@@ -77,6 +78,7 @@ class Rig:
         self.box: TriggerBox | None = None
         self._maker = maker
         self._fit = fit
+        self._files = FileEvidence()
         self._turn = threading.Lock()
         self._doing: str | None = None
         self._aborted = threading.Event()
@@ -200,7 +202,7 @@ class Rig:
             firing = run.run()
             run.progress(Progress("checking pictures", 0.7))
             sizes = picture_sizes(self.station, self._design)
-            captured = pair_and_judge(self.station, firing, self._fit, sizes)
+            captured = pair_and_judge(self.station, firing, self._fit, sizes, self._files)
             return captured, gather(self.station, captured, board)
         except BaseException as error:
             # Whatever else goes wrong now, the first error is the one to be told.
@@ -273,7 +275,7 @@ class Rig:
         order = CaptureOrder(f"sync-check-{number}", box_name("sync-check"))
         firing = self._run(order, ignore_progress, cancel).run()
         sizes = picture_sizes(self.station, self._design)
-        captured = pair_and_judge(self.station, firing, self._fit, sizes)
+        captured = pair_and_judge(self.station, firing, self._fit, sizes, self._files)
         return captured, gather(self.station, captured, board or station_board(self.station))
 
     def adopt(self, timings: Mapping[str, Timing]) -> None:

@@ -189,6 +189,7 @@ class CaptureRun:
             give_up=self._give_up,
             known_s=lambda: self._known_s,
             patience_s=policy.frame_deadline_s,
+            kinds=plan.kinds,
             ready_stamp=max((sample.device_ns for sample in samples), default=None),
         )
 

@@ -74,7 +74,9 @@ class FrameEntry(StrictModel):
     file: FileEntry = Field(description="Where it is filed.")
     media_type: str = Field(description="What kind of file it is.")
     status: str = Field(description="How it arrived: `ok`, `incomplete`, `late`.")
-    method: str = Field(description="How it was given to its shot: `timestamp`, `arrival-order`.")
+    method: str = Field(
+        description="How it was given to its shot: `timestamp`, `file-time`, `arrival-order`."
+    )
     counter: int | None = Field(description="The camera's frame counter.")
     device_ns: int | None = Field(description="The camera's own time stamp.")
     arrived_host_ns: int = Field(description="When it arrived.")

@@ -19,7 +19,9 @@ from typing import Self
 
 from common.errors import ConflictError, InputError
 from common.files.lock import KernelLock, LockHeldError, lock_file
-from rig.acquisition.station.spec import Station
+from rig.acquisition.cameras.folder import FolderBackend, FolderOptions, owned
+from rig.acquisition.cameras.options import read_options
+from rig.acquisition.station.spec import CameraPlan, Station
 
 UNSHARED_BACKENDS = frozenset({"simulated"})
 """Cameras that exist only inside one process: nobody can take them away from another."""
@@ -41,11 +43,19 @@ def device_names(station: Station) -> list[str]:
     if station.trigger is not None and not station.trigger.url.startswith(PRIVATE_BOXES):
         names.append(f"trigger box {_real(station.trigger.url)}")
     names += [
-        f"{camera.backend} camera {camera.id}"
+        _camera_name(station, camera)
         for camera in station.cameras
         if camera.backend not in UNSHARED_BACKENDS
     ]
-    return names
+    return list(dict.fromkeys(names))
+
+
+def _camera_name(station: Station, camera: CameraPlan) -> str:
+    if camera.backend == FolderBackend.name:
+        # Whatever a folder is called here, no other station may take its files meanwhile.
+        options = station.backend_options.get(camera.backend, {})
+        return owned(read_options(camera.backend, FolderOptions, options), camera.id)
+    return f"{camera.backend} camera {camera.id}"
 
 
 def _real(url: str) -> str:

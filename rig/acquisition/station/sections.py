@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import Annotated, Literal, Self
 
 from annotated_types import Len
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from common.files.strict import CameraName, StrictModel
 from rig.acquisition.cameras.base import CameraSettings
+from rig.acquisition.cameras.wholeness import MEDIA_TYPES
 from rig.acquisition.station.spec import (
     BoardPlan,
     CameraPlan,
@@ -136,6 +137,22 @@ class StationCameraSection(StrictModel):
         description="Width and height its pictures must have. Without it: as in the design.",
     )
 
+    files: list[str] = Field(
+        default_factory=list,
+        max_length=4,
+        description='Kinds of files that each shot must bring, such as `[".jpg", ".nef"]`: a shot '
+        "is waited for until all are there, and what is lacking is told. Without it: one picture "
+        "of any kind.",
+    )
+
+    @field_validator("files")
+    @classmethod
+    def _known_kinds(cls, files: list[str]) -> list[str]:
+        strange = [suffix for suffix in files if suffix.lower() not in MEDIA_TYPES]
+        if strange:
+            raise ValueError(f"{strange[0]} is no kind of picture; known: {', '.join(MEDIA_TYPES)}")
+        return files
+
     def to_plan(self) -> CameraPlan:
         """The camera as the rest of the program sees it."""
         size = self.image_size_px
@@ -152,6 +169,7 @@ class StationCameraSection(StrictModel):
             expected_lag_us=self.expected_lag_us,
             lag_tolerance_us=self.lag_tolerance_us,
             image_size_px=None if size is None else (size[0], size[1]),
+            kinds=frozenset(MEDIA_TYPES[suffix.lower()] for suffix in self.files),
         )
 
 

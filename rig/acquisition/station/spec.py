@@ -61,6 +61,8 @@ class CameraPlan:
     expected_lag_us: float = 0.0
     lag_tolerance_us: float = 20_000.0
     image_size_px: tuple[int, int] | None = None
+    kinds: frozenset[str] = frozenset()
+    """Media types of the files that each shot must bring; empty: one picture of any kind."""
 
 
 @dataclass(frozen=True)

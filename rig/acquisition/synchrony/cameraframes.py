@@ -15,6 +15,8 @@ class Method(StrEnum):
 
     TIMESTAMP = "timestamp"
     """The camera's time stamp lies where the shot's trigger puts it."""
+    FILE_TIME = "file-time"
+    """The time in the file fits the shot by the offset of the camera's clock."""
     ARRIVAL = "arrival-order"
     """A last resort: as many pictures came as were asked for, in this order."""
 

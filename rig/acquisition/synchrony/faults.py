@@ -14,6 +14,8 @@ class FaultKind(StrEnum):
     EXTRA_AT_START = "extra-at-start"
     EXTRA = "extra"
     DUPLICATE = "duplicate"
+    HELD_BACK = "held-back"
+    FILE_MISSING = "file-missing"
     AMBIGUOUS = "ambiguous"
     LATE = "late"
     BLACK = "black"
@@ -36,6 +38,7 @@ HARMLESS = frozenset(
     {
         FaultKind.EXTRA_AT_START,
         FaultKind.DUPLICATE,
+        FaultKind.HELD_BACK,
         FaultKind.LATE,
         FaultKind.COUNTER_GAP,
         FaultKind.BY_ARRIVAL,

@@ -58,8 +58,13 @@ def pair(received: CameraFrames) -> Pairing:
     faults += found
     pairs, found = _with_pictures(received, pairs)
     faults += found
-    faults += [fault for one in pairs for fault in _of_status(received, one)]
+    faults += late_faults(received, pairs)
     return Pairing(received.camera, tuple(pairs), tuple(faults))
+
+
+def late_faults(received: CameraFrames, pairs: Sequence[Pair]) -> list[Fault]:
+    """What is to be said of pictures that came late, or not as a whole."""
+    return [fault for one in pairs for fault in _of_status(received, one)]
 
 
 def _with_pictures(received: CameraFrames, pairs: Sequence[Pair]) -> tuple[list[Pair], list[Fault]]:

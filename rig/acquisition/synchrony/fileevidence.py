@@ -1,0 +1,398 @@
+"""Which shot a picture file is of, where nothing but the file itself can tell.
+
+Programs that fetch pictures deliver late, rename, copy and double. What speaks for a file: the
+time in its EXIF against the shot, by the offset of its camera's clock as earlier captures showed
+it; its content against all that was seen; the body it names; its number. A file that cannot be
+shown to belong is held back and named: it stays where its program put it.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import datetime
+from pathlib import PurePath
+
+from rig.acquisition.cameras.base import Frame
+from rig.acquisition.synchrony.cameraframes import Method, Pair, Pairing
+from rig.acquisition.synchrony.faults import Fault, FaultKind
+from rig.acquisition.synchrony.imagechecks import is_raw
+
+SECOND_NS = 1_000_000_000
+SLACK_NS = SECOND_NS // 2
+"""How far the time in a file may be from the start of its exposure beyond its last digit."""
+NEAR_NS = 3 * SECOND_NS // 2
+"""A clock that was set by the computer's is not farther off."""
+ZONE_NS = 1800 * SECOND_NS
+WIDEST_ZONE_NS = 14 * 3600 * SECOND_NS
+"""A clock that was set to another time zone, or to summer time, is off by whole half hours."""
+DRIFT = 1e-4
+"""A camera's clock gains or loses at most this share of the time since it was last compared."""
+REMEMBERED = 500
+"""Shots against which a late picture is held."""
+
+
+@dataclass(frozen=True)
+class Span:
+    """An interval of nanoseconds, both ends included."""
+
+    low_ns: int
+    high_ns: int
+
+    def shifted(self, by_ns: int) -> Span:
+        """The same, later by so much."""
+        return Span(self.low_ns + by_ns, self.high_ns + by_ns)
+
+    def wider(self, below_ns: int, above_ns: int) -> Span:
+        """The same with both ends moved out."""
+        return Span(self.low_ns - below_ns, self.high_ns + above_ns)
+
+    def common(self, other: Span) -> Span | None:
+        """What two intervals have in common."""
+        low, high = max(self.low_ns, other.low_ns), min(self.high_ns, other.high_ns)
+        return Span(low, high) if low <= high else None
+
+
+def file_time(tags: Mapping[str, str]) -> Span | None:
+    """When a file says its picture was taken, in ns since 1970 by its camera's clock.
+
+    Times without a zone are taken to be of the computer's. As wide as the last digit; None where
+    the file does not say.
+    """
+    try:
+        at = datetime.strptime(tags.get("DateTimeOriginal", ""), "%Y:%m:%d %H:%M:%S")
+        zone = tags.get("OffsetTimeOriginal", "").strip()
+        if re.fullmatch(r"[+-]\d\d:\d\d", zone):
+            at = at.replace(tzinfo=datetime.strptime(zone, "%z").tzinfo)
+        seconds = round(at.astimezone().timestamp())
+    except (ValueError, OverflowError, OSError):
+        return None
+    digits = tags.get("SubSecTimeOriginal", "").strip()
+    if not re.fullmatch(r"\d{1,9}", digits):
+        return Span(seconds * SECOND_NS, (seconds + 1) * SECOND_NS)
+    step = SECOND_NS // 10 ** len(digits)
+    low = seconds * SECOND_NS + int(digits) * step
+    return Span(low, low + step)
+
+
+@dataclass(frozen=True)
+class FiredShot:
+    """One shot at the computer's wall clock, in ns since 1970."""
+
+    capture_id: str
+    shot: int
+    at_ns: int
+
+
+@dataclass(frozen=True, eq=False)
+class FileExposure:
+    """The files of one exposure: those of one name without its ending."""
+
+    frames: tuple[Frame, ...]
+    time: Span | None
+
+    @property
+    def name(self) -> str:
+        """The file by which it is named."""
+        return self.frames[0].metadata.get("file", "a file")
+
+
+@dataclass(frozen=True)
+class Clue:
+    """An offset that a held picture would have, were it of the shot it came for."""
+
+    offset: Span
+    shot: FiredShot
+
+
+@dataclass
+class CameraFiles:
+    """What is remembered of one camera. ``outstanding``: shots whose pictures have not come."""
+
+    offset: Span | None = None
+    known_at_ns: int = 0
+    clues: list[Clue] = field(default_factory=list)
+    outstanding: int = 0
+    serial: str = ""
+    number: int | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class FileDelivery:
+    """What came for one camera in one capture, and the shots it may be of.
+
+    ``wait_ns``: how much later than its shot a picture may have been taken, where somebody else
+    fires. ``kinds``: media types each shot must bring.
+    """
+
+    camera: str
+    frames: tuple[Frame, ...]
+    shots: tuple[FiredShot, ...]
+    first_host_ns: int
+    wait_ns: int = 0
+    kinds: frozenset[str] = frozenset()
+
+
+class FileEvidence:
+    """Gives files to shots, and learns from those that are certain. Used by one thread."""
+
+    def __init__(self) -> None:
+        self._cameras: dict[str, CameraFiles] = {}
+        self._shots: list[FiredShot] = []
+
+    def sort(self, deliveries: Sequence[FileDelivery]) -> dict[str, tuple[Pairing, Pairing | None]]:
+        """The pictures of each camera, and the raw files beside them."""
+        owners = _owners(deliveries, {d.camera: self._of(d.camera).serial for d in deliveries})
+        done = {one.camera: self._sorted(one, owners) for one in deliveries}
+        for one in deliveries[:1]:
+            self._shots += one.shots
+        del self._shots[:-REMEMBERED]
+        return done
+
+    def _of(self, camera: str) -> CameraFiles:
+        return self._cameras.setdefault(camera, CameraFiles())
+
+    def _sorted(
+        self, given: FileDelivery, owners: Mapping[str, frozenset[str]]
+    ) -> tuple[Pairing, Pairing | None]:
+        memory, faults = self._of(given.camera), list[Fault]()
+        frames = _own(given, memory, owners, faults)
+        exposures = _exposures(frames)
+        found: dict[int, tuple[FileExposure, Method]] = {}
+        fits = [(e, self._fits(given, memory, e, faults)) for e in exposures]
+        usable = [(e, shots) for e, shots in fits if shots]
+        if len(usable) == len(given.shots) and _in_order(given, usable):
+            for shot, (exposure, _) in zip(given.shots, usable, strict=True):
+                found[shot.shot] = (exposure, _method(exposure))
+        else:
+            for exposure, shots in usable:
+                rivals = [e for e, other in usable if e is not exposure and set(other) & set(shots)]
+                if len(shots) == 1 and not rivals and exposure.time is not None:
+                    found[shots[0].shot] = (exposure, Method.FILE_TIME)
+                else:
+                    _hold(given, exposure, "which shot it is of cannot be told", faults)
+        self._learn(given, memory, found)
+        return _pairings(given, found, faults)
+
+    def _fits(
+        self, given: FileDelivery, memory: CameraFiles, exposure: FileExposure, faults: list[Fault]
+    ) -> list[FiredShot]:
+        """The shots of this capture that a file may be of; none when it is held back."""
+        if exposure.time is None:
+            if memory.outstanding:
+                why = "it tells no time, and an earlier picture has not come: which it is"
+                _hold(given, exposure, f"{why} cannot be told", faults)
+                return []
+            number = _number(exposure.name)
+            if number is not None and memory.number is not None and number <= memory.number:
+                _hold(given, exposure, "its number is not above those of before", faults)
+                return []
+            return list(given.shots)
+        if memory.offset is None:
+            return self._first(given, memory, exposure, exposure.time, faults)
+        age_ns = max(0, given.shots[0].at_ns - memory.known_at_ns)
+        drift_ns = round(DRIFT * age_ns)
+        offset = memory.offset.wider(drift_ns, drift_ns)
+        mine = [s for s in given.shots if _offset(exposure.time, s, given.wait_ns).common(offset)]
+        others = [s for s in self._shots if _offset(exposure.time, s, given.wait_ns).common(offset)]
+        if mine and (not others or not memory.outstanding):
+            return mine
+        if mine:
+            why = f"it may be of capture {others[-1].capture_id} as well"
+        elif others:
+            why = f"it is of capture {others[-1].capture_id}, and came late"
+            memory.outstanding = max(0, memory.outstanding - 1)
+        else:
+            return self._first(given, memory, exposure, exposure.time, faults)
+        _hold(given, exposure, why, faults)
+        return []
+
+    def _first(
+        self,
+        given: FileDelivery,
+        memory: CameraFiles,
+        exposure: FileExposure,
+        at: Span,
+        faults: list[Fault],
+    ) -> list[FiredShot]:
+        """The same for a camera whose clock's offset is not known, or not the one it was."""
+        offsets = {shot: _offset(at, shot, given.wait_ns) for shot in given.shots}
+        agreed = [s for s, offset in offsets.items() if self._agrees(memory, s, offset)]
+        plain = memory.offset is None and not memory.outstanding
+        near = [s for s, offset in offsets.items() if plain and _is_plain(offset)]
+        if agreed or near:
+            return agreed or near
+        shot, offset = next(iter(offsets.items()))
+        seconds = (offset.low_ns + offset.high_ns) / 2e9
+        memory.clues = [*memory.clues[-3:], Clue(offset, shot)]
+        _hold(
+            given,
+            exposure,
+            f"its time is {seconds:+.0f} s off the shot: another shot's picture, or a clock that "
+            "is not set; set the camera's clock, or take one more capture",
+            faults,
+        )
+        return []
+
+    def _agrees(self, memory: CameraFiles, shot: FiredShot, offset: Span) -> bool:
+        """Whether an earlier picture was off by just as much, and not only as one come late."""
+        for clue in memory.clues:
+            if clue.shot.capture_id == shot.capture_id or offset.common(clue.offset) is None:
+                continue
+            if not self._shifted(shot, offset, clue) or _is_plain(offset):
+                return True
+        return False
+
+    def _shifted(self, shot: FiredShot, offset: Span, clue: Clue) -> bool:
+        """Whether both could be of the shot before theirs: a camera that lags behind by one."""
+        now, then = self._before(shot), self._before(clue.shot)
+        if now is None or then is None:
+            return False
+        late = offset.shifted(shot.at_ns - now.at_ns)
+        return late.common(clue.offset.shifted(clue.shot.at_ns - then.at_ns)) is not None
+
+    def _before(self, shot: FiredShot) -> FiredShot | None:
+        earlier = [known for known in self._shots if known.at_ns < shot.at_ns - SLACK_NS]
+        return earlier[-1] if earlier else None
+
+    def _learn(
+        self,
+        given: FileDelivery,
+        memory: CameraFiles,
+        found: Mapping[int, tuple[FileExposure, Method]],
+    ) -> None:
+        by_number = {shot.shot: shot for shot in given.shots}
+        for number, (exposure, method) in found.items():
+            shot = by_number[number]
+            if method is Method.FILE_TIME and exposure.time is not None:
+                offset = _offset(exposure.time, shot, given.wait_ns)
+                sharper = None if memory.offset is None else memory.offset.common(offset)
+                memory.offset, memory.known_at_ns = sharper or offset, shot.at_ns
+                memory.clues.clear()
+            tags = exposure.frames[0].metadata
+            memory.serial = memory.serial or tags.get("BodySerialNumber", "")
+            counted = _number(exposure.name)
+            memory.number = memory.number if counted is None else counted
+        memory.outstanding += len(given.shots) - len(found)
+
+
+def _offset(at: Span, shot: FiredShot, wait_ns: int) -> Span:
+    """What the camera's clock is ahead of the computer's, were the picture of this shot."""
+    return at.shifted(-shot.at_ns).wider(SLACK_NS + wait_ns, SLACK_NS)
+
+
+def _is_plain(offset: Span) -> bool:
+    """Whether a clock so far off is one that was set, if perhaps to another time zone."""
+    middle = (offset.low_ns + offset.high_ns) // 2
+    half = (offset.high_ns - offset.low_ns) // 2
+    away = abs((middle + ZONE_NS // 2) % ZONE_NS - ZONE_NS // 2)
+    return abs(middle) <= WIDEST_ZONE_NS + half and away <= max(NEAR_NS, half)
+
+
+def _number(name: str) -> int | None:
+    digits = re.findall(r"\d+", PurePath(name).stem)
+    return int(digits[-1]) if digits else None
+
+
+def _method(exposure: FileExposure) -> Method:
+    return Method.ARRIVAL if exposure.time is None else Method.FILE_TIME
+
+
+def _in_order(
+    given: FileDelivery, usable: Sequence[tuple[FileExposure, Sequence[FiredShot]]]
+) -> bool:
+    return all(shot in shots for shot, (_, shots) in zip(given.shots, usable, strict=True))
+
+
+def _hold(given: FileDelivery, exposure: FileExposure, why: str, faults: list[Fault]) -> None:
+    names = ", ".join(frame.metadata.get("file", "a file") for frame in exposure.frames)
+    text = f"{given.camera}: {names} is held back: {why}"
+    faults.append(Fault(FaultKind.HELD_BACK, text, given.camera))
+
+
+def _owners(
+    deliveries: Sequence[FileDelivery], serials: Mapping[str, str]
+) -> dict[str, frozenset[str]]:
+    """The cameras that a content came for, where it came for several: those it may be of."""
+    came: dict[str, dict[str, Frame]] = {}
+    for one in deliveries:
+        for frame in one.frames:
+            came.setdefault(frame.metadata.get("sha256", ""), {})[one.camera] = frame
+    owners = {}
+    for content, frames in came.items():
+        if content and len(frames) > 1:
+            body = next(iter(frames.values())).metadata.get("BodySerialNumber", "")
+            named = frozenset(name for name in frames if body and serials[name] == body)
+            owners[content] = named if len(named) == 1 else frozenset()
+    return owners
+
+
+def _own(
+    given: FileDelivery,
+    memory: CameraFiles,
+    owners: Mapping[str, frozenset[str]],
+    faults: list[Fault],
+) -> list[Frame]:
+    """The frames without copies, and without what is of another body or from before the shot."""
+    own: dict[str, Frame] = {}
+    for number, frame in enumerate(given.frames):
+        tags, lone = frame.metadata, FileExposure((frame,), None)
+        content = tags.get("sha256", str(number))
+        body = tags.get("BodySerialNumber", "")
+        if content in own:
+            text = f"{given.camera}: {lone.name} is the same file once more; it is kept once"
+            faults.append(Fault(FaultKind.DUPLICATE, text, given.camera))
+        elif tags.get("known_as"):
+            _hold(given, lone, f"it is {tags['known_as']} once more", faults)
+        elif content in owners and given.camera not in owners[content]:
+            _hold(given, lone, "the same file came for another camera", faults)
+        elif body and memory.serial and body != memory.serial:
+            _hold(given, lone, f"it is of the body {body}, not of {memory.serial}", faults)
+        elif frame.arrived_host_ns < given.first_host_ns:
+            text = f"{given.camera}: a picture that came before the first shot is left out"
+            faults.append(Fault(FaultKind.EXTRA_AT_START, text, given.camera))
+        else:
+            own[content] = frame
+    return list(own.values())
+
+
+def _exposures(frames: Sequence[Frame]) -> list[FileExposure]:
+    """Files by exposure, in order of their times, numbers and arrival."""
+    groups: dict[str, list[Frame]] = {}
+    for number, frame in enumerate(frames):
+        stem = PurePath(frame.metadata.get("file", str(number))).stem.casefold()
+        groups.setdefault(stem, []).append(frame)
+    exposures = []
+    for group in groups.values():
+        ordered = tuple(sorted(group, key=is_raw))
+        times = [at for frame in ordered if (at := file_time(frame.metadata)) is not None]
+        exposures.append(FileExposure(ordered, times[0] if times else None))
+
+    def order(e: FileExposure) -> tuple[int, int, int]:
+        at = 0 if e.time is None else e.time.low_ns
+        return at, _number(e.name) or 0, e.frames[0].arrived_host_ns
+
+    return sorted(exposures, key=order)
+
+
+def _pairings(
+    given: FileDelivery,
+    found: Mapping[int, tuple[FileExposure, Method]],
+    faults: list[Fault],
+) -> tuple[Pairing, Pairing | None]:
+    pairs, beside = [], []
+    for shot in given.shots:
+        if shot.shot not in found:
+            text = f"{given.camera}: no picture of shot {shot.shot}"
+            faults.append(Fault(FaultKind.MISSING, text, given.camera, shot.shot))
+            continue
+        exposure, method = found[shot.shot]
+        first, *others = (Pair(shot.shot, frame, method) for frame in exposure.frames)
+        pairs.append(first)
+        beside += others
+        for kind in sorted(given.kinds - {frame.media_type for frame in exposure.frames}):
+            text = f"{given.camera}: shot {shot.shot} brought no file of the kind {kind}"
+            faults.append(Fault(FaultKind.FILE_MISSING, text, given.camera, shot.shot))
+    raws = Pairing(given.camera, tuple(beside), ()) if beside else None
+    return Pairing(given.camera, tuple(pairs), tuple(faults)), raws

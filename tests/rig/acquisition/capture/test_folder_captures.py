@@ -1,0 +1,235 @@
+"""Captures with folder cameras: real files that arrive badly, through a whole rig."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import threading
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from datetime import datetime, timedelta
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+import pytest
+from memoryrig import with_policy
+from PIL import Image
+from PIL.ExifTags import IFD, Base
+
+from common.errors import ConflictError, InputError
+from rig.acquisition.capture.rig import Rig
+from rig.acquisition.session.folder import Session
+from rig.acquisition.session.records import CaptureRecord
+from rig.acquisition.station.spec import CameraPlan, Station
+from rig.devices.station import open_station
+
+CAMERAS = ("cam01", "cam02", "cam03")
+
+
+def jpeg(at: datetime | None, seed: int, serial: str = "") -> bytes:
+    """A picture taken at ``at`` by its camera's clock; the seed is what it shows."""
+    noise = np.random.default_rng(seed).integers(60, 250, (24, 32, 3), np.uint8)
+    exif = Image.Exif()
+    details = exif.get_ifd(IFD.Exif)
+    if at is not None:
+        details[Base.DateTimeOriginal] = at.strftime("%Y:%m:%d %H:%M:%S")
+        details[Base.SubsecTimeOriginal] = f"{at.microsecond:06d}"[:2]
+    if serial:
+        details[Base.BodySerialNumber] = serial
+    data = BytesIO()
+    Image.fromarray(noise).save(data, "JPEG", exif=exif)
+    return data.getvalue()
+
+
+def station(root: Path, **more: object) -> Station:
+    for name in CAMERAS:
+        (root / name).mkdir(parents=True, exist_ok=True)
+    plans = tuple(CameraPlan(name, "folder", name, **more) for name in CAMERAS)  # type: ignore[arg-type]
+    options = {"folder": {"root": str(root), "settle_s": 0.05}}
+    made = Station("tethered", plans, backend_options=options)
+    return with_policy(made, frame_deadline_s=1.0, settle_s=0.15, min_free_mb=0.0)
+
+
+class Tethered:
+    """An open rig of folder cameras and a session."""
+
+    def __init__(self, rig: Rig, session: Session, root: Path) -> None:
+        self.rig, self.session, self.root = rig, session, root
+        self.seed = 0
+
+    def write(self, camera: str, name: str, at: datetime | None) -> bytes:
+        self.seed += 1
+        data = jpeg(at, self.seed)
+        (self.root / camera / name).write_bytes(data)
+        return data
+
+    def capture(
+        self, capture_id: str, deliver: Callable[[datetime], None], delay_s: float = 0.1
+    ) -> CaptureRecord:
+        """A capture during which files arrive; they are told when FIRE was."""
+
+        def soon() -> None:
+            fired = datetime.now()
+            time.sleep(delay_s)
+            deliver(fired)
+
+        def on(progress: object) -> None:
+            if getattr(progress, "stage", "") == "firing":
+                threading.Thread(target=soon).start()
+
+        return self.rig.capture(self.session, capture_id, progress=on).record
+
+    def sound(self, number: int) -> Callable[[datetime], None]:
+        """Every camera delivers its picture."""
+
+        def deliver(fired: datetime) -> None:
+            for name in CAMERAS:
+                self.write(name, f"DSC_{number:04d}.JPG", fired)
+
+        return deliver
+
+
+@pytest.fixture
+def tethered(tmp_path: Path) -> Iterator[Tethered]:
+    root = tmp_path / "tether"
+    with open_station(station(root), locks=tmp_path / "locks") as rig:
+        session = rig.new_session(tmp_path / "session")
+        with session:
+            yield Tethered(rig, session, root)
+
+
+def held(record: CaptureRecord) -> str:
+    return "; ".join(fault.text for fault in record.faults if fault.kind == "held-back")
+
+
+def test_sound_pictures_are_given_by_their_times(tethered: Tethered) -> None:
+    record = tethered.capture("one", tethered.sound(1))
+    assert record.state == "complete", record.faults
+    assert not record.faults
+    assert {frame.method for frame in record.frames} == {"file-time"}
+
+
+def test_the_previous_file_renamed_after_arming_is_held_back(tethered: Tethered) -> None:
+    tethered.capture("one", tethered.sound(1))
+
+    def deliver(fired: datetime) -> None:
+        before = tethered.root / "cam01" / "DSC_0001.JPG"
+        before.rename(before.with_name("subject.JPG"))
+        for name in CAMERAS[1:]:
+            tethered.write(name, "DSC_0002.JPG", fired)
+
+    record = tethered.capture("two", deliver)
+    assert record.missing == {"cam01": [1]}
+    assert "cam01: subject.JPG is held back: it is DSC_0001.JPG once more" in held(record)
+
+
+def test_a_file_missed_in_one_shot_is_not_taken_for_the_next(tethered: Tethered) -> None:
+    tethered.capture("one", tethered.sound(1))
+    late: list[datetime] = []
+
+    def lacking(fired: datetime) -> None:
+        late.append(fired)
+        for name in CAMERAS[1:]:
+            tethered.write(name, "DSC_0002.JPG", fired)
+
+    assert tethered.capture("two", lacking).missing == {"cam01": [1]}
+    time.sleep(1.2)
+
+    def landing(fired: datetime) -> None:
+        tethered.write("cam01", "DSC_0002.JPG", late[0])
+        for name in CAMERAS[1:]:
+            tethered.write(name, "DSC_0003.JPG", fired)
+
+    record = tethered.capture("three", landing)
+    assert record.missing == {"cam01": [1]}
+    assert "of capture two, and came late" in held(record)
+
+
+def test_a_file_of_years_ago_is_held_back(tethered: Tethered) -> None:
+    def deliver(fired: datetime) -> None:
+        tethered.write("cam01", "DSC_0001.JPG", fired - timedelta(days=2000, seconds=400))
+        for name in CAMERAS[1:]:
+            tethered.write(name, "DSC_0001.JPG", fired)
+
+    record = tethered.capture("one", deliver)
+    assert record.missing == {"cam01": [1]}
+    assert "s off the shot" in held(record)
+
+
+def test_an_identical_double_is_kept_once(tethered: Tethered) -> None:
+    def deliver(fired: datetime) -> None:
+        tethered.sound(1)(fired)
+        for name in CAMERAS:
+            folder = tethered.root / name
+            shutil.copyfile(folder / "DSC_0001.JPG", folder / "DSC_0001 (copy).JPG")
+
+    record = tethered.capture("one", deliver)
+    assert record.state == "complete"
+    assert {fault.kind for fault in record.faults} == {"duplicate"}
+
+
+def test_half_a_file_that_is_renamed_when_whole_is_of_the_shot_before(tethered: Tethered) -> None:
+    part = tethered.root / "cam01" / "DSC_0001.tmp"
+    part.write_bytes(b"half")
+
+    def deliver(fired: datetime) -> None:
+        part.write_bytes(jpeg(None, 99))
+        part.rename(part.with_suffix(".JPG"))
+        for name in CAMERAS[1:]:
+            tethered.write(name, "DSC_0001.JPG", fired)
+
+    record = tethered.capture("one", deliver)
+    assert record.missing == {"cam01": [1]}
+    assert "DSC_0001.tmp once more" in held(record)
+
+
+def test_a_pipe_among_the_files_stops_nobody(tethered: Tethered) -> None:
+    os.mkfifo(tethered.root / "cam01" / "DSC_0000.JPG")
+    assert tethered.capture("one", tethered.sound(1)).state == "complete"
+
+
+def test_a_raw_file_that_comes_later_joins_its_shot_or_is_told(tmp_path: Path) -> None:
+    root = tmp_path / "tether"
+    both = frozenset({"image/jpeg", "image/png"})
+    with (
+        open_station(station(root, kinds=both), locks=tmp_path / "locks") as rig,
+        rig.new_session(tmp_path / "session") as session,
+    ):
+        made = Tethered(rig, session, root)
+
+        def pairs(fired: datetime) -> None:
+            made.sound(1)(fired)
+            time.sleep(0.4)
+            for name in CAMERAS:
+                picture = Image.open(root / name / "DSC_0001.JPG")
+                data = BytesIO()
+                picture.save(data, "PNG")
+                (root / name / "DSC_0001.PNG").write_bytes(data.getvalue())
+
+        record = made.capture("one", pairs)
+        assert record.state == "complete", record.faults
+        lacking = made.capture("two", made.sound(2))
+        assert {fault.kind for fault in lacking.faults} == {"file-missing"}
+        assert lacking.state == "partial" and not lacking.missing
+
+
+def test_locks_go_by_folder_and_not_by_name(tmp_path: Path) -> None:
+    one, other = station(tmp_path / "a"), station(tmp_path / "b")
+    locks = tmp_path / "locks"
+    with open_station(one, locks=locks), open_station(other, locks=locks):
+        link = tmp_path / "link"
+        link.symlink_to(tmp_path / "a")
+        renamed = {"root": str(link), "cameras": {"left": "cam01"}}
+        same = replace(
+            one,
+            cameras=(CameraPlan("left", "folder", "left"),),
+            backend_options={"folder": renamed},
+        )
+        with pytest.raises(ConflictError, match=r"folder .*cam01 is in use"):
+            open_station(same, locks=locks)
+    twice = {"root": str(tmp_path / "a"), "cameras": {"left": "cam01", "right": "cam01"}}
+    plans = (CameraPlan("left", "folder", "left"), CameraPlan("right", "folder", "right"))
+    with pytest.raises(InputError, match=r"'left' and 'right' have the same folder"):
+        open_station(replace(one, cameras=plans, backend_options={"folder": twice}), locks=locks)
