@@ -278,15 +278,18 @@ class SimulatedCamera:
             exposure_us=self._settings.exposure_us,
             metadata={"pixel_format": self._settings.pixel_format or ""},
         )
-        picture = self._pool.photograph(self._shot(trigger, lot, start))
+        picture = self._pool.photograph(self._shot(spec, trigger, lot, start))
         limits = (late, not free)
         self._coming.append(Coming(frame, picture, lot.faults, *limits))
         if "duplicate" in lot.faults:
             again = replace(frame, arrived_host_ns=arrives + _DUPLICATE_NS)
             self._coming.append(Coming(again, picture, lot.faults, *limits))
 
-    def _shot(self, trigger: Triggered, lot: Draw, start: int) -> Shot:
+    def _shot(self, spec: ArmSpec, trigger: Triggered, lot: Draw, start: int) -> Shot:
         settings = self._settings
+        # Within a session the number of the capture counts, because exposures are counted anew by
+        # each program: pictures of one session would share their noise, and held things a place.
+        numbers = (self._number, spec.number) if spec.number else (self._number,)
         since = start if trigger.origin_ns is None else trigger.origin_ns
         board = self._simulation.scene.board
         board_ns = start - (trigger.board_zero_ns or 0)
@@ -300,9 +303,9 @@ class SimulatedCamera:
             settings.pixel_format or "RGB8",
             (start - since) * 1e-9,
             board_ns * 1e-3,
-            (*self._seed, self._number),
+            (*self._seed, *numbers),
             "black" in lot.faults,
-            trigger.capture,
+            spec.number or trigger.capture,
             **self._knock(),
         )
 

@@ -44,7 +44,8 @@ class HeldSettings:
 
     Drawn about its ``place``: up to ``within_mm`` away along the rig's axes, turned by up to
     ``roll_deg`` in its plane and tilted by up to ``tilt_deg`` out of it. Within a capture it is
-    still. The draw depends on ``seed`` and the number of the capture only.
+    still. The draw depends on ``seed`` and the number of the capture in its session only, outside a
+    session on how many captures there were since the program began.
     """
 
     within_mm: Triple = (40.0, 40.0, 40.0)

@@ -21,6 +21,7 @@ from service.cli.commands.evaluate import evaluate
 from service.cli.commands.export import export
 from service.cli.commands.fake_trigger import fake_trigger
 from service.cli.commands.plan import plan
+from service.cli.commands.practice import practice
 from service.cli.commands.rig import rig
 from service.cli.commands.serve import serve
 from service.cli.commands.sessions import sessions
@@ -61,7 +62,7 @@ def _options(
 for command in (
     *(demo, design, evaluate, plan, catalogue, export),
     *(targets, calibrate, check, accept),
-    *(capture, cameras, fake_trigger, serve),
+    *(practice, capture, cameras, fake_trigger, serve),
 ):
     app.command(command.__name__.replace("_", "-"))(command)
 for group in (rig, trigger, sessions):

@@ -26,6 +26,10 @@ LINK = re.compile(r"\]\(([^)\s]+)\)")
 CODE = re.compile(r"^```.*?^```|`[^`\n]*`", re.DOTALL | re.MULTILINE)
 
 
+IN_A_SESSION = {"rig/rig_config.json"}
+"""Files that stand in a session, whose folder ``rig`` is not ours."""
+
+
 def links(page: Path) -> Iterator[tuple[str, Path, str]]:
     """Each link of a page into the project: as written, its file, its anchor."""
     for link in LINK.findall(CODE.sub("", page.read_text(encoding="utf-8"))):
@@ -57,6 +61,19 @@ def test_every_page_of_the_docs_can_be_reached_from_their_index() -> None:
             left += [page for page in new - seen if page.suffix == ".md"]
             seen |= new
     assert sorted(set((ROOT / "docs").rglob("*.md")) - seen) == []
+
+
+def test_pages_name_files_that_exist() -> None:
+    tops = "common|geometry|solver|rig|calibration|evaluation|service|benchmarks|tests|examples"
+    told = re.compile(rf"`((?:{tops})/[\w/.-]*)`")
+    named = [(page, name) for page in PAGES for name in told.findall(page.read_text("utf-8"))]
+    assert len(named) > 40
+    for page, name in named:
+        if name in IN_A_SESSION:
+            continue
+        place = ROOT / name
+        there = place.exists() or place.with_suffix(".py").exists()
+        assert there, f"{page.relative_to(ROOT)} names {name}"
 
 
 def test_code_names_pages_that_exist() -> None:

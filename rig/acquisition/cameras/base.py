@@ -100,11 +100,15 @@ class CameraSettings:
 
 @dataclass(frozen=True)
 class ArmSpec:
-    """One capture to be ready for. ``deadline_s`` is for each frame, from the moment of firing."""
+    """One capture to be ready for. ``deadline_s`` is for each frame, from the moment of firing.
+
+    ``number`` counts the captures of a session from 1; 0 for what belongs to none.
+    """
 
     capture_id: str
     shots: int
     deadline_s: float
+    number: int = 0
 
 
 @dataclass(frozen=True)

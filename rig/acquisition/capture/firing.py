@@ -33,13 +33,17 @@ FATES = {
 
 @dataclass(frozen=True)
 class CaptureOrder:
-    """One capture as it was asked for. ``box_capture`` is its name at the box."""
+    """One capture as it was asked for. ``box_capture`` is its name at the box.
+
+    ``number`` is its number in its session, 0 for what is in none.
+    """
 
     capture_id: str
     box_capture: str
     shots: int = 1
     interval_us: float = 0.0
     allow_partial: bool = False
+    number: int = 0
 
 
 @dataclass(frozen=True, eq=False)

@@ -167,7 +167,8 @@ class Rig:
             session.require_space(self.station.policy.min_free_mb)
             stage = Stage(session, capture_id)
             name = box_name(session.manifest.session_id, capture_id)
-            order = CaptureOrder(capture_id, name, shots, interval_us, partial)
+            number = session.next_number
+            order = CaptureOrder(capture_id, name, shots, interval_us, partial, number)
             run = self._run(order, progress, cancel, stage)
             captured, evidence = self._shoot(run, stage, board or station_board(self.station))
             progress(Progress("writing", 0.8))

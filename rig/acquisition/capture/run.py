@@ -96,7 +96,8 @@ class CaptureRun:
     def _arm_cameras(self) -> tuple[dict[str, Ready], tuple[Fault, ...]]:
         self.progress(Progress("arming cameras", 0.05))
         policy = self.station.policy
-        spec = ArmSpec(self.order.capture_id, self.order.shots, policy.frame_deadline_s)
+        order = self.order
+        spec = ArmSpec(order.capture_id, order.shots, policy.frame_deadline_s, order.number)
         jobs = {
             thread.plan.name: thread.do(partial(_arm, settings=thread.plan.settings, spec=spec))
             for thread in self.threads

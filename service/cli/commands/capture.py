@@ -52,18 +52,26 @@ def capture(
             show_default=False,
         ),
     ] = None,
+    count: Annotated[
+        int, typer.Option(min=1, max=1000, help="Captures to take, one after another.")
+    ] = 1,
+    pause_s: Annotated[
+        float, typer.Option(min=0.0, help="From one capture to the next, to move what is held.")
+    ] = 0.0,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Do all but fire.")] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Fire a rig once and file what it photographed, with the proof that it was synchronised.
+    """Fire a rig and file what it photographed, with the proof that it was synchronised.
 
-    Ctrl-C takes all outputs low and files nothing.
+    Ctrl-C takes all outputs low and files nothing of the capture that is being taken.
 
     Exit code: 0 done, 2 bad input, 4 a device is missing or a picture is, 130 interrupted.
 
     Example:  rigwright capture --station station.toml --subject anna
     """
-    asked = Asked(capture_id, subject, operator, shots, interval_ms * 1e3, allow_partial)
+    asked = Asked(
+        capture_id, subject, operator, shots, interval_ms * 1e3, allow_partial, count, pause_s
+    )
     run_capture_command(station, session, asked, dry_run=dry_run, as_json=as_json)
 
 
@@ -80,12 +88,15 @@ class Asked:
     shots: int
     interval_us: float
     allow_partial: bool | None
+    count: int = 1
+    pause_s: float = 0.0
 
 
 def run_capture_command(
     station: Path, folder: Path | None, asked: Asked, *, dry_run: bool, as_json: bool
 ) -> None:
-    """Take one capture, or rehearse it."""
+    """Take captures, or rehearse one."""
+    from common.errors import CancelledError, InputError
     from rig.acquisition.station.stationfile import read_station
     from rig.devices.station import open_station
     from service.cli.output import show
@@ -93,6 +104,12 @@ def run_capture_command(
     from service.cli.running import cancel_on_signal, one_line_errors
 
     with one_line_errors(), ExitStack() as stack:
+        if asked.count > 1 and asked.capture_id is not None:
+            raise InputError(
+                "capture-id-count",
+                "captures of one id are one capture",
+                "leave --id or --count out",
+            )
         rig = stack.enter_context(open_station(read_station(station)))
         cancel = stack.enter_context(cancel_on_signal())
         report = told(stack.enter_context(show_progress()))
@@ -107,19 +124,21 @@ def run_capture_command(
             show({"ready": dry.ready, "faults": [f.text for f in dry.faults]}, as_json=as_json)
             return
         session = stack.enter_context(_session(rig, folder, asked))
-        result = rig.capture(
-            session,
-            asked.capture_id or f"cap-{datetime.now():%Y%m%dT%H%M%S}-{secrets.token_hex(3)}",
-            shots=asked.shots,
-            interval_us=asked.interval_us,
-            allow_partial=asked.allow_partial,
-            progress=report,
-            cancel=cancel,
-        )
-        stack.close()
-        show(_capture_figures(result), as_json=as_json)
-        if result.error is not None:
-            raise result.error
+        for number in range(asked.count):
+            if number and cancel.wait(asked.pause_s):
+                raise CancelledError
+            result = rig.capture(
+                session,
+                asked.capture_id or f"cap-{datetime.now():%Y%m%dT%H%M%S}-{secrets.token_hex(3)}",
+                shots=asked.shots,
+                interval_us=asked.interval_us,
+                allow_partial=asked.allow_partial,
+                progress=report,
+                cancel=cancel,
+            )
+            show(_capture_figures(result), as_json=as_json)
+            if result.error is not None:
+                raise result.error
 
 
 def _session(rig: Rig, folder: Path | None, asked: Asked) -> Session:

@@ -95,11 +95,14 @@ def run_design(
     from common.files.folders import new_folder
     from common.files.ownership import files_of
     from service.cli.running import one_line_errors, run_task
+    from service.cli.scans import remember_scan
     from service.problems import EXIT_INFEASIBLE
 
     with one_line_errors():
         with new_folder(out, force=force, spare=inputs.values()) as folder:
             result = run_task(entry, request, inputs, folder)
+            if "scan" in inputs:
+                remember_scan(folder, out, inputs["scan"])
         _show(result, files_of(out), as_json=as_json)
     if not result["feasible"]:
         raise typer.Exit(EXIT_INFEASIBLE)

@@ -4,14 +4,22 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+if TYPE_CHECKING:
+    from geometry.camera import RigCamera
+
 
 def export(
-    design_file: Annotated[
-        Path, typer.Argument(metavar="DESIGN.json", help="The cameras.", show_default=False)
+    cameras: Annotated[
+        Path,
+        typer.Argument(
+            metavar="CAMERAS",
+            help="A design or a calibration: its folder, or its design.json or calibration.json.",
+            show_default=False,
+        ),
     ],
     form: Annotated[
         str | None,
@@ -21,16 +29,26 @@ def export(
         Path | None,
         typer.Option(metavar="DIR", help="New folder; named like the format without it."),
     ] = None,
+    design: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DESIGN.json",
+            help="Of a calibration: the design that was calibrated, for pixel pitch and bodies.",
+            show_default=False,
+        ),
+    ] = None,
     image_suffix: Annotated[str, typer.Option(help="How names of pictures end.")] = ".jpg",
 ) -> None:
-    """Write a design's cameras for photogrammetry software and 3D programs.
+    """Write the cameras of a design or a calibration for photogrammetry and 3D programs.
 
     Example:  rigwright export rig/design.json --format colmap-text --out colmap
+
+    Example:  rigwright export my-calibration --format opencv --out opencv
     """
     if form is None:
         list_formats()
         return
-    run_export_command(design_file, form, out or Path(form), image_suffix)
+    run_export_command(cameras, form, out or Path(form), design, image_suffix)
 
 
 def list_formats() -> None:
@@ -41,14 +59,61 @@ def list_formats() -> None:
         sys.stdout.write(f"{form.name:16} {form.program}: {form.description}\n")
 
 
-def run_export_command(design: Path, form: str, out: Path, image_suffix: str) -> None:
+def run_export_command(
+    cameras: Path, form: str, out: Path, design: Path | None, image_suffix: str
+) -> None:
     """Write one export."""
     from geometry.exchange import ExportOptions, write_export
-    from rig.design.designfile import read_design
     from service.cli.running import one_line_errors
 
     with one_line_errors():
-        cameras = read_design(design).cameras
-        written = write_export(out, form, cameras, ExportOptions(image_suffix))
+        chosen = _cameras(cameras, design)
+        written = write_export(out, form, chosen, ExportOptions(image_suffix))
         for path in written.values():
             sys.stdout.write(f"{path}\n")
+
+
+def _cameras(given: Path, design: Path | None) -> tuple[RigCamera, ...]:
+    from calibration.exports import rig_cameras
+    from calibration.files import read_calibration
+    from common.errors import InputError
+    from rig.design.designfile import read_design
+
+    path = _file_in(given)
+    if _schema(path).startswith("rigwright.calibration/"):
+        like = read_design(design).cameras if design is not None else ()
+        return rig_cameras(read_calibration(path).calibration.cameras, tuple(like))
+    if design is not None:
+        raise InputError(
+            "export-design",
+            f"{path} is no calibration",
+            "leave --design out",
+        )
+    return tuple(read_design(path).cameras)
+
+
+def _file_in(given: Path) -> Path:
+    """The file to read of a folder that ``rigwright`` wrote; a file is itself."""
+    from common.errors import InputError
+
+    if not given.is_dir():
+        return given
+    for name in ("calibration.json", "design.json"):
+        if (given / name).is_file():
+            return given / name
+    raise InputError(
+        "export-folder",
+        f"the folder {given} holds neither calibration.json nor design.json",
+        "give what `rigwright design` or `rigwright calibrate` wrote",
+    )
+
+
+def _schema(path: Path) -> str:
+    """What a file says it is; nothing where it cannot be read, which its reader will tell."""
+    import json
+
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return ""
+    return str(document.get("schema", "")) if isinstance(document, dict) else ""

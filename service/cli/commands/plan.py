@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -33,7 +32,7 @@ def plan(
         Path | None,
         typer.Option(
             metavar="SCAN",
-            help="The head it was designed for; looked for beside the design without it.",
+            help="The head it was designed for; the design knows where it was without it.",
             show_default=False,
         ),
     ] = None,
@@ -88,34 +87,19 @@ def run_plan_command(
     from common.errors import InputError
     from common.files.folders import new_folder
     from service.cli.running import one_line_errors, run_task
+    from service.cli.scans import scan_of
     from service.problems import EXIT_INFEASIBLE
 
     with one_line_errors():
         if options.paper not in PAPERS:
             raise InputError("paper", f"there is no paper {options.paper!r}", "give A4 or A3")
-        inputs = {"design": design, "mount": mount, "scan": scan or _scan_beside(design)}
+        inputs = {"design": design, "mount": mount, "scan": scan or scan_of(design)}
         with new_folder(out, force=force, spare=inputs.values()) as folder:
             result = run_task("service.tasks.planning:plan", asdict(options), inputs, folder)
         _show(result, out, as_json=as_json)
     if not result["buildable"]:
         sys.stderr.write(f"rigwright: {_why(result)}\n")
         raise typer.Exit(EXIT_INFEASIBLE)
-
-
-def _scan_beside(design: Path) -> Path:
-    """The scan that a design names, in the design's own folder."""
-    from common.errors import InputError
-
-    try:
-        name = json.loads(design.read_text(encoding="utf-8"))["scan"]["name"]
-    except (OSError, ValueError, KeyError, TypeError):
-        name = ""
-    beside = design.parent / Path(str(name)).name
-    if not name or not beside.is_file():
-        raise InputError(
-            "no-scan", "the head that the design was made for is not beside it", "give --scan"
-        )
-    return beside
 
 
 def _why(result: JSON) -> str:

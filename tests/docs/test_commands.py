@@ -1,0 +1,157 @@
+"""The commands and snippets of the pages: known to the program, and those of the README run."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+import typer
+
+from service.cli import app
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGES = [
+    ROOT / "README.md",
+    *sorted((ROOT / "docs").rglob("*.md")),
+    *sorted((ROOT / "examples").rglob("*.md")),
+]
+FENCE = re.compile(r"^```(\w*)\n(.*?)^```", re.DOTALL | re.MULTILINE)
+INLINE = re.compile(r"(?<!`)`(rigwright [^`\n]+)`(?!`)")
+EXIT_CODE = re.compile(r"\s+# exit code (\d+)$")
+KINDS = {"sh", "python", "toml", "json", "text", "http", "yaml", "xml", "csv"}
+
+
+@dataclass(frozen=True)
+class Command:
+    """A command as it is printed."""
+
+    page: str
+    line: str
+
+    @property
+    def words(self) -> list[str]:
+        """What the shell makes of it, as far as it is of rigwright."""
+        words = shlex.split(self.line, comments=True)
+        ends = [k for k, word in enumerate(words) if word in ("|", "&", "&&", ";", ">", "…", "...")]
+        return words[1 : min(ends, default=len(words))]
+
+
+def commands() -> Iterator[Command]:
+    for page in PAGES:
+        text = page.read_text(encoding="utf-8")
+        name = str(page.relative_to(ROOT))
+        for _, block in FENCE.findall(text):
+            for line in block.replace("\\\n", " ").splitlines():
+                if line.startswith("rigwright "):
+                    yield Command(name, line)
+        for line in INLINE.findall(FENCE.sub("", text)):
+            yield Command(name, line)
+
+
+COMMANDS = list(commands())
+
+
+def options_of(words: list[str]) -> tuple[set[str], list[str]]:
+    """The options of the command that words name, and the rest of the words."""
+    found: Any = typer.main.get_command(app)
+    while (below := getattr(found, "commands", None)) and words and not words[0].startswith("-"):
+        assert words[0] in below, f"there is no command {words[0]}"
+        found, words = below[words[0]], words[1:]
+    names = {name for p in found.params for name in (*p.opts, *p.secondary_opts)}
+    return names | {"--help"}, words
+
+
+def test_there_are_commands_on_the_pages() -> None:
+    assert len(COMMANDS) > 25
+
+
+@pytest.mark.parametrize("command", COMMANDS, ids=lambda c: f"{c.page}: {c.line}")
+def test_every_command_on_a_page_exists_with_its_options(command: Command) -> None:
+    known, rest = options_of(command.words)
+    for word in rest:
+        if word.startswith("--"):
+            assert word.partition("=")[0] in known, word
+
+
+def test_every_block_says_what_it_is() -> None:
+    for page in PAGES:
+        for kind, block in FENCE.findall(page.read_text(encoding="utf-8")):
+            assert kind in KINDS, f"{page.relative_to(ROOT)}: {block[:40]!r}"
+
+
+def shell_lines() -> list[tuple[str, int]]:
+    """The commands of the README's first hour in order, each with the exit code it should have."""
+    lines = []
+    for kind, block in FENCE.findall((ROOT / "README.md").read_text(encoding="utf-8")):
+        for line in block.splitlines() if kind == "sh" else ():
+            told = EXIT_CODE.search(line)
+            lines.append((line, int(told[1]) if told else 0))
+    return lines
+
+
+def installed() -> dict[str, str]:
+    """An environment in which ``rigwright`` is the one to be tried, from wherever it is called."""
+    chosen = os.environ.get("RIGWRIGHT_BIN") or str(Path(sys.executable).parent)
+    return {**os.environ, "PATH": f"{chosen}{os.pathsep}{os.environ['PATH']}"}
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(3600)
+def test_the_first_hour_runs_as_printed(tmp_path: Path) -> None:
+    lines = shell_lines()
+    assert len(lines) >= 20
+    for line, code in lines:
+        done = subprocess.run(
+            ["bash", "-c", line],
+            cwd=tmp_path,
+            env=installed(),
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.returncode == code, f"{line}\n{done.stdout[-2000:]}\n{done.stderr[-2000:]}"
+    for kind, page, block in snippets():
+        done = subprocess.run(
+            [Path(installed()["PATH"].split(os.pathsep)[0]) / "python", "-c", block],
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.returncode == 0, f"{page} ({kind})\n{done.stderr[-2000:]}"
+
+
+def snippets() -> list[tuple[str, str, str]]:
+    """The Python of the pages: kind, page, text."""
+    return [
+        (kind, str(page.relative_to(ROOT)), block)
+        for page in PAGES
+        for kind, block in FENCE.findall(page.read_text(encoding="utf-8"))
+        if kind == "python"
+    ]
+
+
+def test_the_readme_says_what_git_ignores() -> None:
+    outputs = re.findall(
+        r"--(?:out|session|history) (\S+)", " ".join(line for line, _ in shell_lines())
+    )
+    assert len(outputs) > 10
+    names = [f"{name}/x" for name in outputs]
+    done = subprocess.run(
+        ["git", "check-ignore", "--no-index", *names],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if done.returncode == 128:
+        pytest.skip("not a git checkout")
+    assert done.stdout.split() == names
