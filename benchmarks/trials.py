@@ -9,8 +9,9 @@ import numpy as np
 from synthetic_scenes import Scene, face_scene, plate_places, turned
 
 from calibration.adjustment import Calibration, CalibrationOptions, calibrate
+from calibration.adjustment.forward import intersected
 from calibration.adjustment.initialisation.resection import RigidTransform
-from calibration.adjustment.rotations import rotation_of
+from calibration.adjustment.rotations import rotation_of, similarity
 from calibration.check.checking import CheckOptions, judge
 from calibration.check.diagnosis import Prepared, diagnose
 from calibration.check.epoch import Epoch, epoch_of
@@ -72,14 +73,22 @@ class Bench:
         same = np.array_equal(index, self.index)
         base = self.epoch if same else epoch_of(self.calibration, observations)
         righted = corrected_epoch(base.with_pixels(pixels, base.reference.drawn(rng)))
-        touched = righted.cameras or righted.ids or righted.scales or not same
+        touched = righted.cameras or righted.ids or righted.scales or righted.pictures or not same
         diagnosis = diagnose(
             righted.epoch,
             righted.start.state,
             righted.suspects,
             None if touched else self.prepared,
         )
-        return judge(self.calibration, observations, base, righted, diagnosis, CheckOptions())
+        return judge(
+            self.calibration,
+            observations,
+            base,
+            righted,
+            diagnosis,
+            CheckOptions(),
+            righted.pictures,
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,6 +155,66 @@ def camera_shifted(um: float, axes: int = 3) -> Disturb:
         return _moved(scene, [camera], shift[None], np.zeros((1, 3)))
 
     return disturb
+
+
+def group_moved(most_mm: float, most_mrad: float) -> Disturb:
+    """Two to four neighbours moved as one body, by a random part of a shift and a turn."""
+
+    def disturb(scene: Scene, rng: np.random.Generator) -> Disturbed:
+        count = int(rng.integers(2, 5))
+        first = int(rng.integers(len(scene.cameras) - count + 1))
+        which = list(range(first, first + count))
+        shift = most_mm * rng.uniform() * unit(rng, 3)
+        turn = rotation_of(1e-3 * most_mrad * rng.uniform() * unit(rng, 3))
+        middle = np.mean([scene.cameras[k].pose.position_rig_mm for k in which], axis=0)
+        cameras = list(scene.cameras)
+        for k in which:
+            pose = cameras[k].pose
+            place = middle + turn @ (pose.position_rig_mm - middle) + shift
+            moved = Pose(place, pose.rotation_rig_to_camera @ turn.T)
+            cameras[k] = replace(cameras[k], pose=moved)
+        names = frozenset(scene.cameras[k].name for k in which)
+        return Disturbed(scene.with_cameras(tuple(cameras)), Kind.CAMERA_MOVED, names)
+
+    return disturb
+
+
+def face_error_mm(before: Scene, after: Scene) -> float:
+    """Largest error of a face that the rig of ``after`` photographs and ``before`` computes.
+
+    The face is half an ellipsoid of 150 x 200 x 180 mm about the rig's origin; its points are
+    intersected from the cameras that look at their skin within 60 degrees, two at least. A motion
+    of the face as a whole is no error.
+    """
+    angle = np.radians(np.linspace(-80.0, 80.0, 23))
+    height = np.radians(np.linspace(-60.0, 60.0, 17))
+    a, h = (v.ravel() for v in np.meshgrid(angle, height))
+    normal = np.stack([np.sin(a) * np.cos(h), -np.cos(a) * np.cos(h), np.sin(h)], axis=1)
+    half = np.array([75.0, 90.0, 100.0])
+    points = half * normal
+    outward = normal / half
+    outward /= np.linalg.norm(outward, axis=1, keepdims=True)
+    rows, pixels, numbers = [], [], []
+    for k, camera in enumerate(after.cameras):
+        to_camera = camera.pose.position_rig_mm - points
+        to_camera /= np.linalg.norm(to_camera, axis=1, keepdims=True)
+        seen = np.flatnonzero(np.einsum("pi,pi->p", to_camera, outward) > 0.5)
+        rows.append(np.full(len(seen), k))
+        numbers.append(seen)
+        pixels.append(camera.project(points[seen]))
+    pixel = np.concatenate(pixels)
+    found = intersected(
+        before.cameras,
+        np.concatenate(rows),
+        np.concatenate(numbers),
+        pixel,
+        np.ones_like(pixel),
+        len(points),
+    ).position_rig_mm
+    good = np.isfinite(found).all(axis=1)
+    _, rotation, shift = similarity(found[good], points[good])
+    left = found[good] @ rotation.T + shift - points[good]
+    return float(np.linalg.norm(left, axis=1).max())
 
 
 def two_cameras(urad: float, um: float) -> Disturb:

@@ -9,7 +9,7 @@ stand at one place in all frames; the others have a pose of their own in each fr
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -131,7 +131,8 @@ class Observations:
 
     ``camera``, ``frame``, ``target`` (n,) index ``cameras``, ``frames`` and ``targets.ids``;
     ``pixel`` (n, 2) with pixel centres at integers, ``sigma_px`` (n, 2) as stated by whoever
-    measured it. ``image_size_px`` (cameras, 2) width and height.
+    measured it. ``image_size_px`` (cameras, 2) width and height. ``blur_px`` (n,) sigma of the
+    blur of each target's edges, NaN where it is not known.
     """
 
     targets: TargetSet
@@ -143,6 +144,7 @@ class Observations:
     target: Ints
     pixel: Floats
     sigma_px: Floats
+    blur_px: Floats = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
         count = len(self.pixel)
@@ -168,8 +170,10 @@ class Observations:
             "observations need two finite pixels and positive sigmas each",
             "report this fault",
         )
+        blur = self.blur_px if len(self.blur_px) == count else np.full(count, np.nan)
         object.__setattr__(self, "pixel", frozen(self.pixel))
         object.__setattr__(self, "sigma_px", frozen(self.sigma_px))
+        object.__setattr__(self, "blur_px", frozen(blur))
 
     def subset(self, rows: Ints) -> Observations:
         """Some of the rows, cameras, frames and targets kept."""
@@ -183,4 +187,13 @@ class Observations:
             self.target[rows],
             self.pixel[rows],
             self.sigma_px[rows],
+            self.blur_px[rows],
         )
+
+    def camera_blur_px(self) -> Floats:
+        """Median blur of each camera's targets (cameras,); NaN where it is not known."""
+        out = np.full(len(self.cameras), np.nan)
+        known = np.isfinite(self.blur_px)
+        for k in np.unique(self.camera[known]):
+            out[k] = np.median(self.blur_px[known & (self.camera == k)])
+        return out

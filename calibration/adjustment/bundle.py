@@ -179,6 +179,7 @@ def _result(
         "inner constraints on all cameras" if network.datum else "reference poses",
         _quality(observations, options, done, cameras),
         ResidualTable(done.start.rows, solution.residuals.pixel, done.reliability, done.rejected),
+        observations.camera_blur_px(),
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -146,7 +146,8 @@ class Calibration:
     ``target_mm`` (m, 3) in carrier frames, NaN for targets that were not seen.
     ``covariance`` is in the datum named by ``datum``; it covers cameras and targets in the order
     of ``cameras`` and ``targets.ids``. ``noise`` corrects stated sigmas of image points, camera by
-    camera. ``residuals`` is None after reading from a file.
+    camera. ``residuals`` is None after reading from a file. ``blur_px`` (cameras,): how sharp the
+    targets were, NaN where that is not known.
     """
 
     cameras: tuple[CalibratedCamera, ...]
@@ -158,8 +159,11 @@ class Calibration:
     datum: str
     quality: CalibrationQuality
     residuals: ResidualTable | None = None
+    blur_px: Floats = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
+        blur = self.blur_px if len(self.blur_px) else np.full(len(self.cameras), np.nan)
+        object.__setattr__(self, "blur_px", frozen(blur))
         object.__setattr__(self, "target_mm", frozen(self.target_mm))
 
     def camera(self, name: str) -> CalibratedCamera:

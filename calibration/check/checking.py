@@ -8,14 +8,15 @@ import numpy as np
 
 from calibration.adjustment.result import Calibration
 from calibration.check import messages as words
+from calibration.check.condition import LEAST_POINTS, condition_of
 from calibration.check.diagnosis import Diagnosis, diagnose
 from calibration.check.effects import effects
 from calibration.check.epoch import Epoch, epoch_of
-from calibration.check.findings import findings, scale_estimate
+from calibration.check.findings import findings, joint_effect_mm, scale_estimate
 from calibration.check.gross import Corrected, corrected_epoch
 from calibration.check.hypotheses import ALPHA, Cause
+from calibration.check.subject import subject_of
 from calibration.check.tables import (
-    LEAST_POINTS,
     Noise,
     camera_checks,
     carrier_checks,
@@ -69,6 +70,9 @@ def check(
     """
     cancel = cancel or NeverCancelled()
     progress(Progress("reading", 0.0))
+    condition = condition_of(reference, observations)
+    if not condition.keep.all():
+        observations = observations.subset(np.flatnonzero(condition.keep))
     epoch = epoch_of(reference, observations)
     _go_on(cancel)
     progress(Progress("gross faults", 0.2))
@@ -78,7 +82,15 @@ def check(
     diagnosis = diagnose(corrected.epoch, corrected.start.state, corrected.suspects)
     _go_on(cancel)
     progress(Progress("verdict", 0.9))
-    return judge(reference, observations, epoch, corrected, diagnosis, options or CheckOptions())
+    return judge(
+        reference,
+        observations,
+        epoch,
+        corrected,
+        diagnosis,
+        options or CheckOptions(),
+        (*condition.findings, *corrected.pictures),
+    )
 
 
 def _go_on(cancel: CancelToken) -> None:
@@ -93,13 +105,22 @@ def judge(
     corrected: Corrected,
     diagnosis: Diagnosis,
     options: CheckOptions,
+    before: tuple[Finding, ...] = (),
 ) -> CheckResult:
-    """All tables and findings of a finished diagnosis."""
+    """All tables and findings of a finished diagnosis.
+
+    ``before``: what the state of the pictures told already; of these cameras nothing else is told.
+    """
     found = effects(diagnosis.epoch, diagnosis.first.state)
     noise = noise_of(diagnosis)
-    alarms = [_weighed(f, options) for f in findings(corrected, diagnosis, found)]
+    subject = subject_of(diagnosis.epoch, diagnosis.first.state)
+    alarms = _weighed(
+        findings(corrected, diagnosis, found, subject),
+        joint_effect_mm(diagnosis, subject),
+        options,
+    )
     cameras = camera_checks(diagnosis, found, noise, options.hidden_limit_mm)
-    reported = verdicts(alarms, cameras, noise, diagnosis)
+    reported = _after(before, verdicts(alarms, cameras, noise, diagnosis))
     scale, scale_sigma = _scale(diagnosis)
     distances = reference.targets.distances or observations.targets.distances
     residual = diagnosis.first.v * _sigmas(diagnosis)
@@ -123,12 +144,46 @@ def judge(
     )
 
 
-def _weighed(finding: Finding, options: CheckOptions) -> Finding:
-    """The finding, marked as tolerable when its effect at the subject is."""
-    if finding.kind not in STOPPING or not finding.effect_mm < options.tolerance_mm:
-        return finding
-    more = f" That is less than the {words.length(options.tolerance_mm)} that matter."
-    return replace(finding, tolerable=True, sentence=finding.sentence + more)
+def _after(before: tuple[Finding, ...], reported: tuple[Finding, ...]) -> tuple[Finding, ...]:
+    """What the pictures' state told first, then what does not follow from it."""
+    blamed = {name for f in before for name in f.subjects}
+    if not blamed:
+        return reported
+    rest = [
+        f
+        for f in reported
+        if f.kind is not Kind.FINE and not (f.kind in FOLLOWS and set(f.subjects) <= blamed)
+    ]
+    return (*before, *rest)
+
+
+FOLLOWS = (
+    Kind.CAMERA_MOVED,
+    Kind.LENS_CHANGED,
+    Kind.UNSYNCHRONISED,
+    Kind.NOISE_RAISED,
+    Kind.CANNOT_TELL,
+)
+CAMERA_KINDS = (Kind.CAMERA_MOVED, Kind.LENS_CHANGED)
+
+
+def _weighed(found: list[Finding], joint_mm: float, options: CheckOptions) -> list[Finding]:
+    """The findings, marked as tolerable where their effect at the subject is.
+
+    ``joint_mm``: what all changes of cameras do together. Where that matters, none of them is
+    tolerable, however little it does by itself.
+    """
+    small = [f.kind in STOPPING and f.effect_mm < options.tolerance_mm for f in found]
+    out = []
+    for finding, tolerable in zip(found, small, strict=True):
+        more = f" That is less than the {words.length(options.tolerance_mm)} that matter."
+        if tolerable and finding.kind in CAMERA_KINDS and joint_mm >= options.tolerance_mm:
+            tolerable, more = False, " " + words.together(joint_mm)
+            finding = replace(finding, sentence=finding.sentence + more)
+        if tolerable:
+            finding = replace(finding, tolerable=True, sentence=finding.sentence + more)
+        out.append(finding)
+    return out
 
 
 def _sigmas(diagnosis: Diagnosis) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:

@@ -31,6 +31,9 @@ LARGE_PX = 3.0
 """Changes beyond this are compared by full fits: the linear statistics mislead there."""
 
 SHORTLIST = 6
+ALIKE = 1.5
+"""Chi-square per image point that one cause for all cameras may leave."""
+
 MOST_SETS = 2000
 
 
@@ -54,6 +57,7 @@ class Diagnosis:
 
     ``first``: fit, tests and their outcomes with nothing changed; ``last``: the fit with all
     ``accepted`` causes free. ``epoch`` is without the ``outliers`` rows (of the given one).
+    ``start``: the state that the fits began with.
     """
 
     epoch: Epoch
@@ -63,6 +67,7 @@ class Diagnosis:
     accepted: tuple[Hypothesis, ...]
     last: Fit
     outliers: int
+    start: State
 
     @property
     def nobody_stands(self) -> bool:
@@ -91,7 +96,8 @@ def diagnose(
     outcomes = tests.run(first.score)
     last, accepted, present, current = first, [], outcomes, tests
     if suspects:
-        accepted = convicted(epoch, state, tests.hypotheses, suspects, first)
+        accepted = _all_alike(epoch, state, tests)
+        accepted = accepted or convicted(epoch, state, tests.hypotheses, suspects, first)
         last = fit_with(epoch, state, accepted)
         epoch, last, lost = _cleaned(epoch, last)
         current = ScoreTests(tests.hypotheses, last.linear)
@@ -114,7 +120,31 @@ def diagnose(
         accepted = better
         current = ScoreTests(tests.hypotheses, last.linear)
         present = current.run(last.score)
-    return Diagnosis(epoch, first, tests, outcomes, tuple(accepted), last, lost)
+    accepted, last = _pruned(epoch, state, accepted, last)
+    return Diagnosis(epoch, first, tests, outcomes, tuple(accepted), last, lost, state)
+
+
+def _pruned(
+    epoch: Epoch, state: State, accepted: list[Hypothesis], last: Fit
+) -> tuple[list[Hypothesis], Fit]:
+    """Without causes that were accepted early and that later ones explain as well."""
+    if len(accepted) < 2 or len({h.cause for h in accepted}) < 2:
+        return accepted, last
+    whole, kept = fit_with(epoch, state, accepted), list(accepted)
+    for one in accepted:
+        if one.cause is Cause.POSE:
+            continue
+        fewer = [h for h in kept if h is not one]
+        without = fit_with(epoch, state, fewer)
+        if without.chi2 - whole.chi2 < chi2.isf(one.alpha, one.ways.shape[1]):
+            kept, last = fewer, without
+    return kept, last
+
+
+def _all_alike(epoch: Epoch, state: State, tests: ScoreTests) -> list[Hypothesis]:
+    """The cause that changes all cameras alike, where it alone explains what several show."""
+    every = [h for h in tests.hypotheses if h.cause is Cause.ALL_FOCAL]
+    return every if fit_with(epoch, state, every).chi2 < ALIKE * 2 * len(epoch.pixel) else []
 
 
 def _together(causes: list[Hypothesis], last: Fit) -> Floats:

@@ -140,6 +140,13 @@ def _cameras(calibration: Calibration, observations: Observations) -> Ints:
     for k in used:
         camera = calibration.cameras[known[observations.cameras[int(k)]]]
         size = tuple(int(v) for v in observations.image_size_px[int(k)])
+        if size == camera.image_size_px[::-1]:
+            raise InputError(
+                "check-image-turned",
+                f"the images of camera {camera.name!r} are turned by 90 degrees against the "
+                f"reference: {size[0]} x {size[1]} px, not {size[1]} x {size[0]}",
+                "turn the camera or its pictures back",
+            )
         if size != camera.image_size_px:
             raise InputError(
                 "check-image-size",

@@ -7,13 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calibration.adjustment.camera import INTERIOR
+from calibration.adjustment.camera import INTERIOR, PER_CAMERA
 from calibration.check import messages as words
 from calibration.check.diagnosis import Diagnosis
 from calibration.check.effects import Effects
 from calibration.check.gross import Corrected
+from calibration.check.groups import rigid_group
 from calibration.check.hypotheses import Cause, Hypothesis, log_tail
 from calibration.check.scores import estimate
+from calibration.check.subject import Subject
 from calibration.check.verdicts import Finding, Kind
 from geometry.arrays import Floats
 
@@ -24,6 +26,11 @@ RIVAL = 10.0
 TIE = 0.01
 FACE_MM = 200.0
 MANY_TARGETS = 4
+CROP_PX = 1.5
+CROP_SHARE = 0.1
+"""An image shifted by more than the first, and stretched by less than this share of it, was cut
+out elsewhere: no lens does that."""
+
 SYNC = (Cause.VIEW, Cause.CAMERA_SYNC, Cause.PLACE_SYNC)
 
 
@@ -62,10 +69,45 @@ def changes(diagnosis: Diagnosis) -> tuple[Change, ...]:
     return tuple(out)
 
 
-def findings(corrected: Corrected, diagnosis: Diagnosis, found: Effects) -> list[Finding]:
+def camera_change(one: Change) -> Floats:
+    """A change of a camera or its lens as one of all its parameters (15,)."""
+    out = np.zeros(PER_CAMERA)
+    first = INTERIOR if one.cause.cause is Cause.POSE else 0
+    out[first : first + len(one.change)] = one.change
+    return out
+
+
+def joint_effect_mm(diagnosis: Diagnosis, subject: Subject) -> float:
+    """What all changes of cameras do together at the subject; NaN when none changed."""
+    done: dict[int, Floats] = {}
+    for one in changes(diagnosis):
+        for camera, change in _by_camera(one).items():
+            done[camera] = done.get(camera, np.zeros(PER_CAMERA)) + change
+    return subject.effect_mm(done) if done else float("nan")
+
+
+def _by_camera(one: Change) -> dict[int, Floats]:
+    """A change's share in each camera's parameters (15,); empty for those of targets."""
+    if one.cause.cause in (Cause.POSE, Cause.LENS):
+        return {one.cause.subject: camera_change(one)}
+    if one.cause.cause is not Cause.ALL_FOCAL:
+        return {}
+    pixels = one.cause.ways[:, 0] * one.change[0]
+    first = np.eye(PER_CAMERA)[0]
+    cameras = one.cause.columns // PER_CAMERA
+    return {int(k): px * first for k, px in zip(cameras, pixels, strict=True)}
+
+
+def findings(
+    corrected: Corrected, diagnosis: Diagnosis, found: Effects, subject: Subject
+) -> list[Finding]:
     """All findings of alarming kinds, gross ones first."""
     out = _gross(corrected, diagnosis)
     done = changes(diagnosis)
+    together = rigid_group(diagnosis)
+    if together and not diagnosis.nobody_stands:
+        out.append(_group(together, diagnosis, found, subject))
+        done = tuple(c for c in done if c.cause not in together)
     if diagnosis.nobody_stands:
         out.append(_most_cameras(done, diagnosis))
         done = tuple(c for c in done if c.cause.cause not in (Cause.POSE, Cause.LENS))
@@ -74,9 +116,11 @@ def findings(corrected: Corrected, diagnosis: Diagnosis, found: Effects) -> list
     for one in done:
         cause = one.cause.cause
         if cause is Cause.POSE:
-            out.append(_camera(one, diagnosis, found))
+            out.append(_camera(one, diagnosis, found, subject))
         elif cause is Cause.LENS:
-            out.append(_lens(one, diagnosis, found))
+            out.append(_lens(one, diagnosis, found, subject))
+        elif cause is Cause.ALL_FOCAL:
+            out.append(_all_lenses(one, diagnosis, subject))
         elif cause is Cause.TARGET:
             by_carrier[int(diagnosis.epoch.target_carrier[one.cause.subject])].append(one)
         elif cause in (Cause.BEND, Cause.SHAPE):
@@ -164,10 +208,45 @@ def _scale(one: Change, diagnosis: Diagnosis, corrected: Corrected, found: Effec
     )
 
 
-def _camera(one: Change, diagnosis: Diagnosis, found: Effects) -> Finding:
+def _group(
+    together: tuple[Hypothesis, ...], diagnosis: Diagnosis, found: Effects, subject: Subject
+) -> Finding:
+    """Cameras that moved as one; or all the others did, which looks the same."""
+    epoch = diagnosis.epoch
+    own = [c for c in changes(diagnosis) if c.cause in together]
+    which = {c.cause.subject for c in own}
+    names = tuple(epoch.camera_names[k] for k in sorted(which))
+    seeing = [int(k) for k in np.unique(epoch.camera)]
+    others = tuple(epoch.camera_names[k] for k in seeing if k not in which)
+    px = max(found.of(c.cause.subject, c.change, INTERIOR)[0] for c in own)
+    mm = subject.effect_mm({c.cause.subject: camera_change(c) for c in own})
+    worst = max(own, key=lambda c: c.statistic)
+    return Finding(
+        Kind.CAMERA_MOVED,
+        names,
+        words.group(names, others, px, mm),
+        worst.statistic,
+        worst.dof,
+        worst.log10_p,
+        px,
+        mm,
+        candidates=others,
+    )
+
+
+def _at_subject(one: Change, found: Effects, subject: Subject) -> tuple[float, float]:
+    """Effect of a camera's change in its image, px, and at its worst place of the subject, mm."""
+    camera = one.cause.subject
+    first = INTERIOR if one.cause.cause is Cause.POSE else 0
+    px, everywhere_mm = found.of(camera, one.change, first)
+    mm = subject.effect_mm({camera: camera_change(one)})
+    return px, max(everywhere_mm, mm) if np.isfinite(mm) else everywhere_mm
+
+
+def _camera(one: Change, diagnosis: Diagnosis, found: Effects, subject: Subject) -> Finding:
     camera = one.cause.subject
     names = diagnosis.epoch.camera_names
-    px, mm = found.of(camera, one.change, INTERIOR)
+    px, mm = _at_subject(one, found, subject)
     rivals, tied = _rivals(one, diagnosis)
     kind, sentence = Kind.CAMERA_MOVED, words.moved(names[camera], px, mm)
     subjects: tuple[str, ...] = (names[camera],)
@@ -198,20 +277,41 @@ def _rivals(one: Change, diagnosis: Diagnosis) -> tuple[tuple[str, ...], tuple[s
     return tuple(rivals), tuple(tied)
 
 
-def _lens(one: Change, diagnosis: Diagnosis, found: Effects) -> Finding:
+def _lens(one: Change, diagnosis: Diagnosis, found: Effects, subject: Subject) -> Finding:
     camera = one.cause.subject
     name = diagnosis.epoch.camera_names[camera]
-    px, mm = found.of(camera, one.change, 0)
-    share = float(one.change[0] / diagnosis.epoch.reference.interior[camera, 0])
+    px, mm = _at_subject(one, found, subject)
+    focal_px, *_ = diagnosis.epoch.reference.interior[camera]
+    share = float(one.change[0] / focal_px)
+    shift = (float(one.change[1]), float(one.change[2]))
+    # What the focal length does at the image's border, against the shift of all of it.
+    border_px = abs(share) * max(diagnosis.epoch.image_size_px[camera]) / 2.0
+    whole = float(np.hypot(*shift))
+    cropped = whole > CROP_PX and border_px < CROP_SHARE * whole
     return Finding(
         Kind.LENS_CHANGED,
         (name,),
-        words.lens(name, px, mm, share),
+        words.cropped(name, shift, mm) if cropped else words.lens(name, px, mm, share),
         one.statistic,
         one.dof,
         one.log10_p,
         px,
         mm,
+        value=share,
+    )
+
+
+def _all_lenses(one: Change, diagnosis: Diagnosis, subject: Subject) -> Finding:
+    names = diagnosis.epoch.camera_names
+    share, mm = float(one.change[0]), subject.effect_mm(_by_camera(one))
+    return Finding(
+        Kind.LENS_CHANGED,
+        names,
+        words.all_lenses(1e6 * share, mm),
+        one.statistic,
+        one.dof,
+        one.log10_p,
+        effect_mm=mm,
         value=share,
     )
 

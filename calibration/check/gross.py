@@ -11,6 +11,8 @@ from scipy.optimize import linear_sum_assignment
 from calibration.check.agreement import agreeing
 from calibration.check.consensus import Consensus, by_camera, consensus, misfit_px
 from calibration.check.epoch import Epoch
+from calibration.check.pictures import strange_pictures
+from calibration.check.verdicts import Finding
 from common.errors import InputError
 from geometry.arrays import Bools, Floats, Ints
 
@@ -33,7 +35,8 @@ class Corrected:
 
     ``suspects``: cameras that are far off although the others agree; ``cameras``: cycles of
     swapped ones; ``ids``: pairs (taken for, really) of target indices;
-    ``scales``: carrier and scale of those printed in another size.
+    ``scales``: carrier and scale of those printed in another size; ``pictures``: findings about
+    cameras whose pictures are turned or of other frames, and were left out.
     """
 
     epoch: Epoch
@@ -42,6 +45,7 @@ class Corrected:
     cameras: tuple[tuple[int, ...], ...]
     ids: tuple[tuple[int, int], ...]
     scales: tuple[tuple[int, float], ...]
+    pictures: tuple[Finding, ...] = ()
 
 
 def corrected_epoch(epoch: Epoch) -> Corrected:
@@ -55,6 +59,10 @@ def corrected_epoch(epoch: Epoch) -> Corrected:
     if cameras:
         epoch = _reassigned(epoch, assigned)
         start = consensus(epoch)
+    strange, keep = strange_pictures(epoch, agreeing(epoch, start)[0])
+    if strange:
+        epoch = epoch.with_rows(keep)
+        start = consensus(epoch)
     # A camera that is far off would bend the sizes of everything.
     scales = _scales(epoch, agreeing(epoch, start)[0])
     for carrier, scale in scales:
@@ -65,13 +73,20 @@ def corrected_epoch(epoch: Epoch) -> Corrected:
         epoch = _relabelled(epoch, ids)
         start = consensus(epoch)
     start, suspects = agreeing(epoch, start)
-    return Corrected(epoch, start, suspects, cameras, ids, scales)
+    return Corrected(epoch, start, suspects, cameras, ids, scales, strange)
 
 
 def _assignment(epoch: Epoch, start: Consensus) -> Ints:
     """Which reference camera took each camera's images: swaps that make far better sense."""
-    assigned = np.arange(len(epoch.camera_names))
+    count = len(epoch.camera_names)
+    assigned = np.arange(count)
     cost, bad = _judged(epoch, start)
+    if 2 * bad.sum() > count > 2:
+        # Folders in the opposite order, or all one further: pair by pair that would not be found.
+        for tried in (assigned[::-1], np.roll(assigned, 1), np.roll(assigned, -1)):
+            other, other_bad = _judged(epoch, consensus(epoch, tried))
+            if other < GAIN * cost:
+                cost, bad, assigned = other, other_bad, tried.copy()
     while bad.sum() >= 2:
         best = None
         for a, b in itertools.combinations(np.flatnonzero(bad), 2):

@@ -28,6 +28,7 @@ class Cause(StrEnum):
 
     POSE = "pose"
     LENS = "lens"
+    ALL_FOCAL = "all-focal"
     TARGET = "target"
     SCALE = "scale"
     BEND = "bend"
@@ -39,8 +40,9 @@ class Cause(StrEnum):
 
 
 SHARES = {
-    Cause.POSE: 0.35,
+    Cause.POSE: 0.30,
     Cause.LENS: 0.10,
+    Cause.ALL_FOCAL: 0.05,
     Cause.TARGET: 0.10,
     Cause.SCALE: 0.05,
     Cause.BEND: 0.05,
@@ -115,7 +117,9 @@ def _plain(subject: int, places: Ints) -> tuple[int, Ints, Floats]:
 
 def _cameras(epoch: Epoch, columns: Columns) -> dict[Cause, _Parts]:
     seen = [int(k) for k in np.unique(epoch.camera)]
+    focal = np.array([columns.camera(k, 0, 1)[0] for k in seen])
     return {
+        Cause.ALL_FOCAL: [(0, focal, epoch.reference.interior[seen, 0][:, None])],
         Cause.POSE: [_plain(k, columns.camera(k, INTERIOR, PER_CAMERA)) for k in seen],
         Cause.LENS: [_plain(k, columns.camera(k, 0, 3)) for k in seen],
     }

@@ -25,8 +25,109 @@ def moved(camera: str, px: float, mm: float) -> str:
     """A camera moved."""
     return (
         f"Camera {camera} has moved: its image points are off by {pixels(px)}, which shifts points "
-        f"at the subject by {length(mm)}."
+        f"at the subject by up to {length(mm)}."
     )
+
+
+def missing(cameras: tuple[str, ...]) -> str:
+    """Cameras that showed nothing."""
+    have = "has" if len(cameras) == 1 else "have"
+    return (
+        f"{joined(cameras)} {have} no picture with a target in it: check its power, its cable and "
+        "its view, and take the pictures again."
+    )
+
+
+def blurred(camera: str, now_px: float, before_px: float) -> str:
+    """A camera is out of focus."""
+    return (
+        f"The pictures of camera {camera} are out of focus: edges are blurred by "
+        f"{pixels(now_px)}, by {pixels(before_px)} in the reference. Focus it, clean its lens, "
+        "and calibrate anew; nothing else can be said of it."
+    )
+
+
+def partly_blurred(camera: str, share: float) -> str:
+    """Part of a camera's picture is soft."""
+    return (
+        f"A part of the pictures of camera {camera} is soft ({share:.0%} of its targets): clean "
+        "its lens, then check again."
+    )
+
+
+def lost(camera: str, share: float) -> str:
+    """A camera sees far fewer targets than it should."""
+    return (
+        f"Camera {camera} sees {share:.0%} of the targets that it should, going by the other "
+        "cameras: look for dirt on its lens, its light, and what stands in its view."
+    )
+
+
+def turned(camera: str, degrees: int) -> str:
+    """The whole picture is turned."""
+    return (
+        f"The images of camera {camera} are turned by {degrees} degrees against the reference: "
+        "turn the camera or its pictures back, then check again."
+    )
+
+
+def mirrored(camera: str) -> str:
+    """The whole picture is mirrored."""
+    return (
+        f"The images of camera {camera} are mirrored against the reference: switch mirroring off, "
+        "then check again."
+    )
+
+
+def out_of_step(camera: str, frames: int) -> str:
+    """A camera's pictures belong to other frames."""
+    when = "late" if frames > 0 else "early"
+    count = "one frame" if abs(frames) == 1 else f"{abs(frames)} frames"
+    return (
+        f"The pictures of camera {camera} are {count} {when}: pair them with the frames they "
+        "belong to, then check again."
+    )
+
+
+def reversed_frames(camera: str) -> str:
+    """A camera's pictures are in the opposite order."""
+    return (
+        f"The pictures of camera {camera} are in the opposite order to those of the others: sort "
+        "them, then check again."
+    )
+
+
+def cropped(camera: str, shift_px: tuple[float, float], mm: float) -> str:
+    """The picture is cut out of the sensor elsewhere."""
+    x, y = shift_px
+    return (
+        f"The images of camera {camera} are shifted by ({x:+.1f}, {y:+.1f}) px against the "
+        "reference, as by another crop, binning or offset of its sensor: set it as before, or "
+        f"calibrate anew. Points at the subject shift by up to {length(mm)}."
+    )
+
+
+def all_lenses(ppm: float, mm: float) -> str:
+    """All lenses changed alike."""
+    return (
+        f"The focal lengths of all cameras have changed by {ppm:+.0f} ppm, as by temperature or by "
+        f"pictures of another size: points at the subject shift by up to {length(mm)}. Let the rig "
+        "reach its temperature, then calibrate anew."
+    )
+
+
+def group(cameras: tuple[str, ...], others: tuple[str, ...], px: float, mm: float) -> str:
+    """Cameras that moved as one."""
+    return (
+        f"Cameras {joined(cameras)} have moved together, as if on one part of the rig, or "
+        f"{joined(others)} have: the images cannot tell which. Image points are off by "
+        f"{pixels(px)}, which shifts points at the subject by up to {length(mm)}."
+    )
+
+
+def together(mm: float) -> str:
+    """Several changes, each small, add up."""
+    return f"Together these changes shift points at the subject by up to {length(mm)}."
 
 
 def either(cameras: tuple[str, ...]) -> str:

@@ -13,6 +13,7 @@ from calibration.adjustment.camera import INTERIOR, PER_CAMERA
 from calibration.adjustment.reliability import DELTA0
 from calibration.adjustment.residualgrid import residual_grid
 from calibration.adjustment.result import Calibration
+from calibration.check.condition import LEAST_POINTS
 from calibration.check.consensus import Consensus
 from calibration.check.diagnosis import Diagnosis
 from calibration.check.effects import Effects, sensitivity
@@ -24,7 +25,6 @@ from calibration.check.verdicts import CameraCheck, CarrierCheck, Finding, Kind,
 from calibration.observations import Distance
 from geometry.arrays import Bools, Floats
 
-LEAST_POINTS = 8
 MAD = 1.4826
 
 

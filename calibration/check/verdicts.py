@@ -12,6 +12,9 @@ class Kind(StrEnum):
     """Kinds of findings."""
 
     FINE = "fine"
+    CAMERA_MISSING = "camera-missing"
+    BLURRED = "blurred"
+    TARGETS_LOST = "targets-lost"
     CAMERA_MOVED = "camera-moved"
     LENS_CHANGED = "lens-changed"
     TARGET_MOVED = "target-moved"
@@ -36,6 +39,8 @@ class Light(StrEnum):
 
 STOPPING = frozenset(
     {
+        Kind.CAMERA_MISSING,
+        Kind.BLURRED,
         Kind.CAMERA_MOVED,
         Kind.LENS_CHANGED,
         Kind.SCALE_CHANGED,

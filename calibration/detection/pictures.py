@@ -227,4 +227,5 @@ def _observations(
         np.array([order[i] for d in found for i in d.ids], dtype=np.int64),
         np.concatenate([d.pixel for d in found]),
         np.concatenate([d.sigma_px for d in found]),
+        np.concatenate([d.blur_px for d in found]),
     )

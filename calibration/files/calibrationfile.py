@@ -46,6 +46,7 @@ class CameraModel(StrictModel):
     rotation_rig_to_camera: Matrix
     sigma_scale: float
     sigma_added_px: float
+    blur_px: float | None = None
 
 
 class CarrierModel(StrictModel):
@@ -122,7 +123,7 @@ def calibration_document(record: CalibrationRecord) -> dict[str, Any]:
         "name": record.name,
         "made_utc": record.made_utc,
         "datum": calibration.datum,
-        "cameras": [_camera(c, calibration.noise, k) for k, c in enumerate(calibration.cameras)],
+        "cameras": [_camera(calibration, k) for k in range(len(calibration.cameras))],
         "targets": _targets(calibration.targets),
         "target_mm": _sparse(calibration.target_mm),
         "places": [
@@ -139,8 +140,9 @@ def calibration_document(record: CalibrationRecord) -> dict[str, Any]:
     }
 
 
-def _camera(camera: CalibratedCamera, noise: NoiseModel, index: int) -> dict[str, Any]:
-    interior = camera.interior
+def _camera(calibration: Calibration, index: int) -> dict[str, Any]:
+    camera, noise = calibration.cameras[index], calibration.noise
+    interior, blur_px = camera.interior, float(calibration.blur_px[index])
     return {
         "name": camera.name,
         "image_size_px": list(camera.image_size_px),
@@ -152,6 +154,7 @@ def _camera(camera: CalibratedCamera, noise: NoiseModel, index: int) -> dict[str
         "rotation_rig_to_camera": camera.pose.rotation_rig_to_camera.tolist(),
         "sigma_scale": float(noise.scale[index]),
         "sigma_added_px": float(noise.added_px[index]),
+        "blur_px": blur_px if np.isfinite(blur_px) else None,
     }
 
 
@@ -222,6 +225,7 @@ def calibration_from(text: str | bytes, source: str) -> CalibrationRecord:
         ),
         model.datum,
         record_of(CalibrationQuality, model.quality),
+        blur_px=np.array([np.nan if c.blur_px is None else c.blur_px for c in model.cameras]),
     )
     return CalibrationRecord(model.name, model.made_utc, calibration)
 

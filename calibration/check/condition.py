@@ -1,0 +1,115 @@
+"""Whether pictures are fit to be checked at all: cameras that are missing, soft, or half blind.
+
+These come before any movement: of a camera that is out of focus nobody can say that it moved, and
+dirt on a lens shifts image points as no movement does.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from calibration.adjustment.result import Calibration
+from calibration.check import messages
+from calibration.check.verdicts import Finding, Kind
+from calibration.observations import Observations
+from geometry.arrays import Bools, Floats
+
+LEAST_POINTS = 8
+LEAST_CAMERAS = 2
+ADDED_PX = 1.0
+"""Blur that is added to that of the reference, in squares: less is a day's light and distance."""
+
+SOFT_POINTS = 0.05
+"""Share of a camera's targets that are soft while the others are sharp, from which it is told."""
+
+LOST = 0.4
+ENOUGH = 20
+"""A camera with this many points in the reference should see as many as the others do, or nearly;
+a smaller share is told."""
+
+
+@dataclass(frozen=True, eq=False)
+class Condition:
+    """What is wrong with pictures, and which observations (n,) may take part in a check."""
+
+    findings: tuple[Finding, ...]
+    keep: Bools
+
+    @property
+    def cameras(self) -> frozenset[str]:
+        """Cameras about which nothing else is to be said."""
+        return frozenset(name for f in self.findings for name in f.subjects)
+
+
+def condition_of(reference: Calibration, observations: Observations) -> Condition:
+    """The state of each camera's pictures against the reference's."""
+    keep = np.ones(len(observations.pixel), bool)
+    index = {name: k for k, name in enumerate(observations.cameras)}
+    counts = np.bincount(observations.camera, minlength=len(observations.cameras))
+    points = np.array([counts[index[c.name]] if c.name in index else 0 for c in reference.cameras])
+    found: list[Finding] = []
+    gone = tuple(c.name for c, n in zip(reference.cameras, points, strict=True) if n == 0)
+    if gone:
+        found.append(Finding(Kind.CAMERA_MISSING, gone, messages.missing(gone)))
+    few = tuple(
+        c.name for c, n in zip(reference.cameras, points, strict=True) if 0 < n < LEAST_POINTS
+    )
+    if few:
+        found.append(Finding(Kind.CANNOT_TELL, few, messages.few(few, LEAST_POINTS)))
+        keep &= ~np.isin(observations.camera, [index[name] for name in few])
+    for k, camera in enumerate(reference.cameras):
+        if points[k] < LEAST_POINTS:
+            continue
+        own = observations.camera == index[camera.name]
+        soft, more = _softness(camera.name, float(reference.blur_px[k]), observations, own)
+        if more is not None:
+            found.append(more)
+            keep &= ~soft
+    blamed = {name for f in found for name in f.subjects}
+    found += [f for f in _half_blind(reference, points) if not blamed & set(f.subjects)]
+    # What is left must still be a check: two cameras at the least.
+    if len(np.unique(observations.camera[keep])) < LEAST_CAMERAS:
+        keep[:] = True
+    return Condition(tuple(found), keep)
+
+
+def _softness(
+    name: str, before_px: float, observations: Observations, own: Bools
+) -> tuple[Bools, Finding | None]:
+    """Rows (n,) of a camera that are soft, and what there is to say of them."""
+    blur = np.where(own, observations.blur_px, np.nan)
+    nothing = np.zeros(len(own), bool)
+    if not np.isfinite(before_px) or not np.isfinite(blur).any():
+        return nothing, None
+    limit = float(np.hypot(before_px, ADDED_PX))
+    middle = float(np.nanmedian(blur))
+    if middle > limit:
+        sentence = messages.blurred(name, middle, before_px)
+        return own, Finding(Kind.BLURRED, (name,), sentence, value=middle / before_px)
+    soft = np.nan_to_num(blur) > np.hypot(max(middle, before_px), 1.5 * ADDED_PX)
+    share = float(soft.sum() / own.sum())
+    if share < SOFT_POINTS or soft.sum() < 3:
+        return nothing, None
+    sentence = messages.partly_blurred(name, share)
+    return soft, Finding(Kind.BLURRED, (name,), sentence, value=share)
+
+
+def _half_blind(reference: Calibration, points: Floats) -> list[Finding]:
+    """Cameras that lost most of their targets while the others did not."""
+    before = np.array([c.points for c in reference.quality.cameras], np.float64)
+    enough = (before >= ENOUGH) & (points > 0)
+    if enough.sum() < LEAST_CAMERAS + 1:
+        return []
+    ratio = np.where(enough, points / np.maximum(before, 1.0), np.nan)
+    share = ratio / np.nanmedian(ratio)
+    return [
+        Finding(
+            Kind.TARGETS_LOST,
+            (reference.cameras[k].name,),
+            messages.lost(reference.cameras[k].name, float(share[k])),
+            value=float(share[k]),
+        )
+        for k in np.flatnonzero(np.nan_to_num(share, nan=1.0) < LOST)
+    ]
