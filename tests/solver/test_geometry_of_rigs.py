@@ -19,14 +19,7 @@ from solver.limits import Frame, MotionBox, PoseBounds, StandOff
 from solver.motion import HeadPosition, framing_positions, rest, visibility_positions
 from solver.problem import Problem, camera_at
 from solver.sphere_cover import sphere_cover
-from solver.starts import (
-    axis_rotation,
-    better_roll,
-    fitting_distance,
-    kmeans_start,
-    strip,
-    strips,
-)
+from solver.starts import axis_rotation, better_roll, fitting_distance, kmeans_start, strip, strips
 from solver.variables import FOCUS, PER_CAMERA, Unknowns
 
 PIVOT = np.array([10.0, -20.0, 30.0])

@@ -14,13 +14,7 @@ import rigs
 from common.errors import CancelledError
 from common.progress import NeverCancelled
 from solver.coverage.views import judge, views
-from solver.formulation import (
-    Merit,
-    candidate_constraints,
-    covariance_cost,
-    merit,
-    unknown_bounds,
-)
+from solver.formulation import Merit, candidate_constraints, covariance_cost, merit, unknown_bounds
 from solver.infeasibility import conflicts
 from solver.limits import BaseHeight, Coverage, CoverageTier, Incidence, PoseBounds, StandOff
 from solver.outer_loop import THINNED_POINTS, StartResult, run_start, thinned

@@ -16,7 +16,7 @@ from rig.acquisition.cameras.options import read_options, require
 from rig.acquisition.cameras.remote import RemoteBackend
 from rig.acquisition.cameras.remotecamera import WorkerSpec
 
-INSTALL = "pip install 'rigwright[genicam]'"
+INSTALL = "pip install 'harvesters>=1.4.3,<2'"
 PRODUCERS = "GENICAM_GENTL64_PATH"
 """Folders of producers, by the GenTL standard; makers' installers set it."""
 

@@ -17,7 +17,7 @@ from rig.acquisition.cameras.options import read_options, require
 from rig.acquisition.cameras.remote import RemoteBackend
 from rig.acquisition.cameras.remotecamera import WorkerSpec
 
-INSTALL = "pip install 'rigwright[gphoto2]'"
+INSTALL = "pip install 'gphoto2>=2.6,<3'"
 
 
 class GphotoOptions(StrictModel):

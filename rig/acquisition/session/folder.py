@@ -6,6 +6,7 @@ import contextlib
 import glob
 import re
 import secrets
+import unicodedata
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
@@ -177,7 +178,9 @@ class Session:
 def session_folder(root: Path, subject: str, now: datetime | None = None) -> Path:
     """The usual place for a new session: ``sub-<subject>/ses-<yyyymmddThhmmss>``."""
     now = datetime.now(UTC).astimezone() if now is None else now
-    name = re.sub(r"[^A-Za-z0-9]+", "", subject) or "unnamed"
+    # Composed, so that a letter with its accent is one letter on every disk; all letters stay.
+    composed = unicodedata.normalize("NFC", subject)
+    name = "".join(letter for letter in composed if letter.isalnum()) or "unnamed"
     return root / f"sub-{name}" / f"ses-{now:%Y%m%dT%H%M%S}"
 
 

@@ -33,6 +33,8 @@ class ImageCheck:
     size_px: tuple[int, int] | None
     black: bool = False
     readable: bool = True
+    cut_off: bool = False
+    """Whether the file ends before its picture does."""
 
 
 def is_raw(frame: Frame) -> bool:
@@ -55,18 +57,18 @@ def check_image(frame: Frame) -> ImageCheck:
 def _check_file(data: bytes) -> ImageCheck:
     from PIL import Image as Pictures
 
+    # Behind the end mark some bodies add a few bytes of their own.
+    cut = data[:2] == b"\xff\xd8" and b"\xff\xd9" not in data[-4096:]
     try:
         size = Pictures.open(BytesIO(data)).size
     except (OSError, SyntaxError, ValueError):
         # Each damaged file makes the library throw something else.
-        return ImageCheck(None, readable=False)
+        return ImageCheck(None, readable=False, cut_off=cut)
     # An eighth each way is enough to see whether there is anything, and decodes in no time.
-    pixels = glanced(data)
+    # The decoder fills what is missing of a JPEG that was cut off with grey.
+    pixels = None if cut else glanced(data)
     if pixels is None:
-        return ImageCheck(None, readable=False)
-    if data[:2] == b"\xff\xd8" and b"\xff\xd9" not in data[-4096:]:
-        # The decoder fills what is missing of a JPEG that was cut off with grey.
-        return ImageCheck(size, readable=False)
+        return ImageCheck(size if cut else None, readable=False, cut_off=cut)
     return ImageCheck(size, _black(pixels))
 
 
@@ -84,7 +86,7 @@ def image_faults(pairing: Pairing, size_px: tuple[int, int] | None) -> list[Faul
         name, shot = pairing.camera, one.shot
         which = f"{name}: the picture of shot {shot}"
         if not look.readable:
-            text = f"{which} cannot be read"
+            text = f"{which} {'was cut off on its way' if look.cut_off else 'cannot be read'}"
             faults.append(Fault(FaultKind.UNREADABLE, text, name, shot))
         if look.black:
             text = f"{which} is black; check the flash, the lens cap and the exposure"

@@ -93,6 +93,21 @@ class GenapiNodes:
         return [str(symbol) for symbol in self._map.get_node(name).symbolics]
 
 
+def _require_loadable(producer: str) -> None:
+    """Raise an error that names a producer which cannot be loaded: Harvesters passes over it."""
+    try:
+        loaded = gentl.GenTLProducer.create_producer()
+        loaded.open(producer)
+        loaded.close()
+    except gentl.GenericException as error:
+        why = str(error).partition(";")[2].partition(" (ID")[0].strip() or str(error)
+        raise DeviceError(
+            "producer-broken",
+            f"the producer {producer} cannot be loaded ({why})",
+            "install the maker's software again, or correct the option 'producers'",
+        ) from None
+
+
 class GenicamDriver:
     """One camera; :class:`.serve.Driver` says what each method does."""
 
@@ -112,7 +127,11 @@ class GenicamDriver:
             for producer in self._options["producers"]:
                 self._harvester.add_file(producer)
             self._harvester.update()
-        return list(self._harvester.device_info_list)
+        found = list(self._harvester.device_info_list)
+        if not found:
+            for producer in self._options["producers"]:
+                _require_loadable(producer)
+        return found
 
     def discover(self, skip: Sequence[str]) -> list[dict[str, str]]:  # noqa: ARG002
         """Cameras of all producers, also those in use."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import threading
 import time
 from collections.abc import Mapping, Sequence
@@ -21,6 +22,8 @@ SURE_WAITS = 3
 V4L2_EXPOSURE_US = 100.0
 """V4L2 counts exposure in steps of 100 microseconds."""
 OPEN_MS, READ_MS = 5000, 2000
+DARK = 16
+"""A picture of 8 bits no brighter than this may be without noise."""
 
 
 class OpencvDriver:
@@ -37,6 +40,7 @@ class OpencvDriver:
         self._triggers: list[int] = []
         self._books = threading.Lock()
         self._skip = 0
+        self._last = b""
 
     def open(self, camera_id: str) -> Mapping[str, Any]:
         """Open the source."""
@@ -158,6 +162,8 @@ class OpencvDriver:
         if not done:
             return {"arrived_host_ns": arrived_ns, "status": "incomplete"}, b""
         height, width = image.shape[:2]
+        if self._live:
+            self._require_alive(image)
         header = {
             "arrived_host_ns": arrived_ns,
             "status": "ok",
@@ -166,6 +172,13 @@ class OpencvDriver:
             "pixel_format": "BGR8" if image.ndim == 3 else "Mono8",
         }
         return header, image.tobytes()
+
+    def _require_alive(self, image: Any) -> None:  # noqa: ANN401  (H, W) or (H, W, 3), 8 bits
+        """Notice a stream that gives the same picture for ever."""
+        last, self._last = self._last, hashlib.blake2b(image.tobytes()).digest()
+        # The noise of a sensor makes no two pictures alike; only a covered lens has none.
+        if self._last == last and image.max() > DARK:
+            raise _gone("it gives the same picture again and again")
 
     def disarm(self) -> None:
         """Want no more frames."""

@@ -92,3 +92,15 @@ def test_a_producer_that_is_none_is_named(tmp_path: Path) -> None:
     backend = GenicamBackend(producers=[str(broken)])
     with pytest.raises(DeviceError):
         backend.open("0")
+
+
+def test_a_producer_that_cannot_be_loaded_is_named(tmp_path: Path) -> None:
+    broken = tmp_path / "maker.cti"
+    broken.write_text("no library")
+    backend = GenicamBackend(producers=[str(broken)])
+    with pytest.raises(
+        DeviceError, match=r"the producer .*maker\.cti cannot be loaded \(.*too short"
+    ):
+        backend.discover()
+    # One that works is not kept from working by another one that does not.
+    assert len(GenicamBackend(producers=[str(broken), viky()]).discover()) == 3

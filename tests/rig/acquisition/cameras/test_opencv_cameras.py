@@ -1,9 +1,11 @@
 from __future__ import annotations
 
+import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 from camera_rigs import CameraRig, Webcam, files_rig
@@ -89,3 +91,40 @@ def test_a_source_that_does_not_open_is_named(tmp_path: Path) -> None:
     assert caught.value.code == "device/camera-gone"
     with pytest.raises(NotFoundError, match=r"known: a"):
         backend.open("b")
+
+
+def test_a_stream_that_freezes_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    frozen = threading.Event()
+
+    def send(webcam: Webcam, write: Callable[[bytes], object]) -> None:
+        number = 0
+        while not webcam._stop.wait(1.0 / RATE_HZ):
+            number += not frozen.is_set()
+            picture = np.full((48, 64, 3), 40 + number % 200, np.uint8)
+            data = cv2.imencode(".jpg", picture)[1].tobytes()
+            head = f"--frame\r\nContent-Type: image/jpeg\r\nContent-Length: {len(data)}\r\n\r\n"
+            write(head.encode() + data + b"\r\n")
+
+    monkeypatch.setattr(Webcam, "send", send)
+    webcam = Webcam(RATE_HZ)
+    backend = OpencvBackend(sources={"door": webcam.address})
+    camera = backend.open("door")
+
+    def shoot() -> int:
+        camera.arm(ArmSpec("a", 1, 2.0))
+        camera.software_trigger()
+        return len(camera.wait_frames(1, 2.0))
+
+    try:
+        assert shoot() == 1
+        assert shoot() == 1
+        frozen.set()
+        time.sleep(0.2)
+        # The picture it froze at may still be new to the first command.
+        came = shoot()
+        if came:
+            assert shoot() == 0
+        assert "the same picture again and again" in camera.health().problem
+    finally:
+        backend.close()
+        webcam.stop()

@@ -187,3 +187,14 @@ def test_what_counts_as_black(level: int, dtype: type, black: bool) -> None:
     noise = np.random.default_rng(3).normal(level, level / 8.0, (120, 160))
     frame = Frame("SN", 0, FrameStatus.OK, pixels=noise.clip(0).astype(dtype))
     assert check_image(frame).black == black
+
+
+@pytest.mark.parametrize("kept", [-900, 60])
+def test_a_picture_that_was_cut_off_is_called_that(bench: BenchMaker, kept: int) -> None:
+    whole = BytesIO()
+    noise = np.random.default_rng(1).integers(0, 256, (48, 64, 3), np.uint8)
+    Image.fromarray(noise).save(whole, "JPEG")
+    made = bench(scripts={"cam02": CameraScript(encoded=whole.getvalue()[:kept])})
+    record = made.rig.capture(made.session, "cut").record
+    texts = [fault.text for fault in record.faults if fault.kind == "unreadable"]
+    assert texts == ["cam02: the picture of shot 1 was cut off on its way"]

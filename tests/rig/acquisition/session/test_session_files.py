@@ -23,6 +23,7 @@ from common.errors import InputError
 from rig.acquisition.cameras.base import Frame, FrameStatus
 from rig.acquisition.session import paths
 from rig.acquisition.session.exif import PictureFacts, with_exif
+from rig.acquisition.session.folder import session_folder
 from rig.acquisition.session.pictures import filed
 from rig.acquisition.session.tables import tables
 from rig.acquisition.session.verify import SessionFindingKind, verify_session
@@ -255,6 +256,17 @@ def test_burst_pictures_are_dated_by_their_own_instant(shot: Bench) -> None:
     # 20 ms apart, and microseconds of rounding.
     assert (stamps[1] - stamps[0]).total_seconds() == pytest.approx(0.02, abs=1e-4)
     assert abs(datetime.fromisoformat(record.fired_at) - datetime.now(UTC)) < timedelta(minutes=5)
+
+
+def test_a_subjects_letters_are_kept() -> None:
+    now = datetime(2026, 11, 29, 12, tzinfo=UTC)
+    for subject, name in (
+        ("Anna Müller", "sub-AnnaMüller"),
+        ("Mu\u0308ller", "sub-Müller"),
+        ("李雷 2", "sub-李雷2"),
+        ("../..", "sub-unnamed"),
+    ):
+        assert session_folder(Path("root"), subject, now).parent == Path("root") / name
 
 
 def test_files_follow_their_schemas(shot: Bench) -> None:
