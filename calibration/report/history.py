@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from calibration.check.verdicts import CameraCheck, Kind
 from calibration.files.records import CheckRecord
 from common.page.svg import Series, chart
 
@@ -53,12 +54,17 @@ def history_of(records: Sequence[CheckRecord], reference: str) -> History:
     )
 
 
+def explained(camera: CameraCheck) -> bool:
+    """Whether a camera is fine though its test is above its limit: findings account for that."""
+    return camera.verdict is Kind.FINE and camera.pose_statistic > camera.pose_limit
+
+
 def _trace(name: str, records: Sequence[CheckRecord]) -> CameraTrace:
     nan = float("nan")
     rows = [next((c for c in r.result.cameras if c.name == name), None) for r in records]
     return CameraTrace(
         name,
-        tuple(nan if c is None else c.pose_statistic / c.pose_limit for c in rows),
+        tuple(nan if c is None or explained(c) else c.pose_statistic / c.pose_limit for c in rows),
         tuple(nan if c is None else c.effect_mm for c in rows),
         tuple(nan if c is None else c.effect_px for c in rows),
     )

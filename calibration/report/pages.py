@@ -6,7 +6,8 @@ from calibration.adjustment.result import Calibration
 from calibration.check.verdicts import CameraCheck, CheckResult, Kind, Light
 from calibration.files.calibrationfile import CalibrationRecord
 from calibration.files.records import CheckRecord
-from calibration.report.history import History, history_svg
+from calibration.report.history import History, explained, history_svg
+from calibration.report.network import network_figures, values_table
 from calibration.report.residualplot import residual_plot
 from common.page.document import still_page
 from common.page.html import esc, text_table
@@ -64,7 +65,9 @@ def check_page(record: CheckRecord, reference: Calibration | None = None) -> str
         *(f'<p class="note">{esc(note)}</p>' for note in result.notes),
         "<h2>Cameras</h2>",
         _camera_table(result.cameras),
-        f'<p class="note">Load: the pose test over its limit, an alarm above 1. Smallest: what '
+        f'<p class="note">Load: the pose test over its limit, an alarm above 1 unless a finding '
+        "explains it: points tie the cameras together, so where one moves others' tests answer. "
+        "Smallest: what "
         "this check could have seen of a movement (Baarda, delta0 4.13); "
         f"{result.power95_factor:.1f} times as much is reported in 95 of 100 checks.</p>",
         "<h2>Targets</h2>",
@@ -107,14 +110,15 @@ def _camera_table(cameras: tuple[CameraCheck, ...]) -> str:
         numbers = (
             c.rms_px,
             c.noise_factor,
-            c.pose_statistic / c.pose_limit,
             c.effect_px,
             1e3 * c.effect_mm,
             turn,
             shift,
             hidden,
         )
-        rows.append((c.name, told, str(c.points), *(number(v) for v in numbers)))
+        figures = [number(v) for v in numbers]
+        load = "explained" if explained(c) else number(c.pose_statistic / c.pose_limit)
+        rows.append((c.name, told, str(c.points), *figures[:2], load, *figures[2:]))
     return text_table(head, rows)
 
 
@@ -217,6 +221,11 @@ def calibration_page(record: CalibrationRecord) -> str:
                 text_table(("", ""), facts),
                 "<h2>Cameras</h2>",
                 text_table(head, rows),
+                "<h2>What was calibrated</h2>",
+                values_table(calibration),
+                network_figures(calibration),
+                '<p class="note">Green: cameras and which way they look; grey: every place in '
+                "which a target was seen.</p>",
                 "<h2>Residuals over the images</h2>",
                 f'<div class="plots">{plots}</div>',
             ]

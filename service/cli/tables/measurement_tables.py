@@ -16,8 +16,13 @@ def _number(value: float | None, digits: int = 3) -> str:
     return "-" if value is None else f"{value:.{digits}f}"
 
 
-def _load(statistic: float | None, limit: float | None) -> str:
-    return "-" if statistic is None or not limit else f"{statistic / limit:.2f}"
+def _load(statistic: float | None, limit: float | None, verdict: str) -> str:
+    """A test over its limit; a camera that is fine all the same has what was found to thank."""
+    if statistic is None or not limit:
+        return "-"
+    if verdict == "fine" and statistic > limit:
+        return "explained"
+    return f"{statistic / limit:.2f}"
 
 
 def _say(*lines: str) -> None:
@@ -108,14 +113,14 @@ def print_check(result: JSON) -> None:
     console.print(f"[bold {_LIGHTS[light]}]{light.upper()}[/]  {escape(result['text'])}")
     table = Table(
         *("Camera", "Verdict", "Test", "Effect mm", "Effect px", "Could hide mm"),
-        title="Cameras (a test above 1 alarms; effects at the subject)",
+        title="Cameras (a test above 1 alarms, unless a finding explains it)",
         title_justify="left",
     )
     for row in result["cameras"]:
         table.add_row(
             escape(row["name"]),
             row["verdict"] + (f" ({escape(row['reason'])})" if row["reason"] else ""),
-            _load(row["pose_statistic"], row["pose_limit"]),
+            _load(row["pose_statistic"], row["pose_limit"], row["verdict"]),
             _number(row["effect_mm"]),
             _number(row["effect_px"]),
             _number(row["hidden_mm"]),
