@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from common.errors import RigwrightError
-from service.wire import error_from_fields
+from service.ipc import error_from_fields
 
 MEDIA_TYPE = "application/problem+json"
 

@@ -7,6 +7,7 @@ from enum import StrEnum
 
 import numpy as np
 
+from calibration.defaults import VOLUME_MM
 from common.errors import InputError
 
 LEAST_LINES = 7
@@ -56,9 +57,9 @@ class LengthLimit:
 class Volume:
     """The measured volume: width, height and depth, mm."""
 
-    width_mm: float = 300.0
-    height_mm: float = 300.0
-    depth_mm: float = 200.0
+    width_mm: float = VOLUME_MM[0]
+    height_mm: float = VOLUME_MM[1]
+    depth_mm: float = VOLUME_MM[2]
 
     def __post_init__(self) -> None:
         sides = (self.width_mm, self.height_mm, self.depth_mm)

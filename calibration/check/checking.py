@@ -25,6 +25,7 @@ from calibration.check.tables import (
     power95_factor,
 )
 from calibration.check.verdicts import STOPPING, CameraCheck, CheckResult, Finding, Kind, Light
+from calibration.defaults import HIDDEN_LIMIT_MM, TOLERANCE_MM
 from calibration.observations import Observations
 from common.errors import CancelledError, InputError
 from common.progress import CancelToken, NeverCancelled, Progress, ProgressCallback, ignore_progress
@@ -40,12 +41,11 @@ class CheckOptions:
     """What matters at the subject.
 
     ``hidden_limit_mm``: a camera of which larger effects could hide is not called fine.
-    ``tolerance_mm``: smaller effects are told, but do not turn the light red. A face needs 0.05 mm
-    at most; 0.02 mm is comfortable.
+    ``tolerance_mm``: smaller effects are told, but do not turn the light red.
     """
 
-    hidden_limit_mm: float = 0.1
-    tolerance_mm: float = 0.02
+    hidden_limit_mm: float = HIDDEN_LIMIT_MM
+    tolerance_mm: float = TOLERANCE_MM
 
     def __post_init__(self) -> None:
         if not (self.hidden_limit_mm > 0.0 and self.tolerance_mm >= 0.0):

@@ -103,6 +103,12 @@ def parse_rig(text: str, name: str = "rig", catalogue: Catalogue | None = None) 
     return rig_from_mapping(parsed(text, name, "rig", "rig file"), name, catalogue)
 
 
+def read_rig_file(path: Path) -> RigFile:
+    """The same before it is put together: as it can be handed on."""
+    data = parsed(read_text(path, "rig", "rig file"), path.name, "rig", "rig file")
+    return validated(RigFile, data, path.name)
+
+
 def read_rig(path: Path, catalogue: Catalogue | None = None) -> RigSpec:
     """A rig from a file; raises a one-line :class:`InputError`."""
     return parse_rig(read_text(path, "rig", "rig file"), path.name, catalogue)

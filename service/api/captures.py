@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any
+from functools import partial
 
 from fastapi import APIRouter, Response
 
 from service.api.context import ServiceDep
 from service.api.job_routes import JobResource
-from service.api.models import Job, Model, problems
-from service.api.rigmodels import CaptureOutcome, CaptureRequest
-from service.rigs.orders import CAPTURE, capture_order
-from service.store.jobrecords import NewJob
+from service.api.models import Job, problems
+from service.kinds.base import Model
+from service.kinds.rigs import CAPTURE, CaptureOutcome, CaptureRequest
+from service.stations.jobs import take_capture
+from service.stations.worker import StationWork
 
 router = APIRouter(tags=["captures"])
 
@@ -39,21 +40,18 @@ resource = JobResource(CAPTURE, "captures", CaptureJob, CapturePage, with_files=
 )
 def add_capture(
     request: CaptureRequest, response: Response, service: ServiceDep, rig: str
-) -> dict[str, Any]:
+) -> Job[CaptureOutcome]:
     """Take a capture, now. The answer comes at once; follow the job for what becomes of it.
 
     The same request again is answered with 200 and the capture there is. 409 while the rig is
     busy, 423 when its interlock is open, 503 when its box or cameras are not there.
     """
-    content = request.model_dump()
-    record, fresh = service.rigs.get(rig).begin(
-        NewJob(CAPTURE, {"rig": rig, **content}), request.capture_id, capture_order(content)
-    )
-    document = resource.document(record)
-    response.headers["Location"] = document["links"]["self"]
+    work = StationWork(CAPTURE, partial(take_capture, request))
+    record, fresh = service.rigs.get(rig).begin(request, request.capture_id, work)
+    response.headers["Location"] = resource.location(record)
     if not fresh:
         response.status_code = 200
-    return document
+    return resource.document(record)
 
 
 resource.add_to(router)

@@ -2,39 +2,29 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated
 
 from fastapi import APIRouter, Response
 from fastapi.responses import HTMLResponse
 from pydantic import Field
 
-from calibration.check import Kind
 from calibration.files import CHECKS
 from calibration.report import history_of, history_page
 from service.api.calibrations import resource as calibrations
 from service.api.context import ServiceDep
 from service.api.job_routes import JobResource
-from service.api.measuring import (
-    Detection,
-    Id,
-    Pictures,
-    completed,
-    made_file,
-    picture_source,
-    target_input,
-    unsaid,
-)
-from service.api.models import IdempotencyKeyHeader, Job, Model, problems
-from service.api.submission import submit
+from service.api.measuring import Pictures, completed, made_file, picture_source, target_input
+from service.api.models import IdempotencyKeyHeader, Job, problems
+from service.api.submission import Submission, asked, submit
+from service.kinds.base import Id, Model
+from service.kinds.check import CHECK, CheckOutcome, CheckRequest
 from service.store.jobrecords import JobInput
 
-JSON = dict[str, Any]
 router = APIRouter(tags=["checks"])
-Light = Literal["green", "yellow", "red"]
 MOST_IN_HISTORY = 500
 
 
-class CheckRequest(Model):
+class CheckBody(CheckRequest):
     """What to check with."""
 
     calibration_id: Id
@@ -42,71 +32,6 @@ class CheckRequest(Model):
     target_set_id: Annotated[
         Id | None, Field(description="The targets shown; without it those of the calibration.")
     ] = None
-    tolerance_mm: Annotated[
-        float,
-        Field(ge=0.0, le=1e3, description="Smaller effects at the subject turn no light red."),
-    ] = 0.02
-    hidden_limit_mm: Annotated[
-        float,
-        Field(gt=0.0, le=1e3, description="A camera that could hide more than this is not fine."),
-    ] = 0.1
-
-
-class FindingEntry(Model):
-    """One thing that a check found. ``docs/explanation/calibration.md`` lists the kinds."""
-
-    kind: Kind
-    light: Light
-    subjects: list[str]
-    text: str
-    effect_px: float | None
-    effect_mm: Annotated[float | None, Field(description="At the subject.")]
-    log10_p: Annotated[
-        float | None, Field(description="Decimal logarithm of the chance of it by accident.")
-    ]
-
-
-class CameraVerdict(Model):
-    """One camera: its verdict, its tests, and the smallest change they would have seen."""
-
-    name: str
-    verdict: Kind
-    reason: str
-    points: int
-    rms_px: float | None
-    pose_statistic: float | None
-    pose_limit: float | None
-    lens_statistic: float | None
-    lens_limit: float | None
-    effect_px: float | None
-    effect_mm: float | None
-    smallest_turn_urad: Annotated[
-        list[float | None] | None,
-        Field(description="Turns about its axes that 95 of 100 checks would report."),
-    ]
-    smallest_shift_um: Annotated[
-        list[float | None] | None,
-        Field(description="Shifts along its axes that 95 of 100 checks would report."),
-    ]
-    hidden_mm: Annotated[
-        float | None, Field(description="Largest effect at the subject that could go unseen.")
-    ]
-
-
-class CheckOutcome(Model):
-    """The verdict on a rig."""
-
-    detection: Detection
-    light: Light
-    text: Annotated[str, Field(description="All findings as sentences.")]
-    findings: list[FindingEntry]
-    cameras: list[CameraVerdict]
-    scale_ppm: float | None
-    scale_sigma_ppm: float | None
-    rms_px: float | None
-    points: int
-    outliers: int
-    notes: list[str]
 
 
 class CheckJob(Job[CheckOutcome]):
@@ -120,7 +45,7 @@ class CheckPage(Model):
     next: int | None
 
 
-resource = JobResource("check", "checks", CheckJob, CheckPage)
+resource = JobResource(CHECK, "checks", CheckJob, CheckPage)
 
 
 @router.post(
@@ -130,31 +55,25 @@ resource = JobResource("check", "checks", CheckJob, CheckPage)
     responses=problems(400, 404, 409, 413, 422, 503, 507),
 )
 def add_check(
-    request: CheckRequest,
+    body: CheckBody,
     response: Response,
     service: ServiceDep,
     idempotency_key: IdempotencyKeyHeader = None,
-) -> JSON:
+) -> Job[CheckOutcome]:
     """Ask whether a rig is still as it was calibrated."""
-    reference = request.calibration_id
-    source, inputs = picture_source(service, request.pictures)
+    reference = body.calibration_id
+    run, inputs = picture_source(service, body.pictures, reference)
     file = made_file(service, reference, "calibration", "calibration.json", "calibration")
-    content = source | {
-        "reference": reference,
-        "tolerance_mm": request.tolerance_mm,
-        "hidden_limit_mm": request.hidden_limit_mm,
-    }
-    inputs = (*inputs, file, _targets(service, request))
-    return submit(
-        service, resource, content, idempotency_key, response, inputs=inputs, unsaid=unsaid()
-    )
+    inputs = (*inputs, file, _targets(service, body))
+    submission = Submission(asked(CheckRequest, body), inputs=inputs, run=run)
+    return submit(service, resource, submission, idempotency_key, response)
 
 
-def _targets(service: ServiceDep, request: CheckRequest) -> JobInput:
-    if request.target_set_id is not None:
-        return target_input(service, request.target_set_id)
+def _targets(service: ServiceDep, body: CheckBody) -> JobInput:
+    if body.target_set_id is not None:
+        return target_input(service, body.target_set_id)
     # The calibration keeps its own targets, even where the target set has been removed.
-    for given in service.store.jobs.given(request.calibration_id):
+    for given in service.store.jobs.given(body.calibration_id):
         if given.role == "targets":
             return given
     raise AssertionError("a calibration is always given targets")
@@ -168,11 +87,9 @@ def _targets(service: ServiceDep, request: CheckRequest) -> JobInput:
 )
 def read_history(service: ServiceDep, job_id: str) -> HTMLResponse:
     """Read how a rig has drifted: a page with all checks against a calibration."""
-    completed(service, job_id, calibrations.kind)
+    completed(service, job_id, calibrations.kind.name)
     records = []
-    for job in service.store.jobs.page(resource.kind, MOST_IN_HISTORY, None):
-        if job.request["reference"] != job_id or job.result is None:
-            continue
+    for job in service.store.jobs.completed_against(resource.kind.name, job_id, MOST_IN_HISTORY):
         files = {file.name: file.path for file in service.store.jobs.files(job.id)}
         records.append(CHECKS.read(files["check.json"]))
     return HTMLResponse(history_page(history_of(records, job_id)))

@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Mapping
-from typing import Annotated
+from typing import Annotated, Any
 
 from anyio import CapacityLimiter
 from fastapi import Depends, Request
 
 from common.errors import InternalError
-from service.jobs.bell import Bell
 from service.jobs.cancels import Cancels
-from service.jobs.engine import Engine, JobKind
+from service.jobs.engine import Engine
 from service.jobs.manager import JobManager
+from service.jobs.notifier import Notifier
 from service.jobs.process import ProcessEngine
-from service.rigs.desk import Books
-from service.rigs.desks import RigDesks, read_stations
-from service.rigs.orders import RIG_KINDS
+from service.kinds.base import JobKind
 from service.settings import Settings
+from service.stations.registry import STATION_KINDS, StationRegistry, read_stations
+from service.stations.worker import WorkerContext
 from service.store import Store
 
 _IMPORTS_AT_ONCE = 2
@@ -28,19 +28,22 @@ class Service:
     """The parts of a running service. Opening it opens the store."""
 
     def __init__(
-        self, settings: Settings, kinds: Mapping[str, JobKind], engine: Engine | None = None
+        self,
+        settings: Settings,
+        kinds: Mapping[str, JobKind[Any, Any]],
+        engine: Engine | None = None,
     ) -> None:
         self.settings = settings
         stations = read_stations(settings.stations)
-        self.store = Store(settings.data_dir, settled_elsewhere=RIG_KINDS)
+        self.store = Store(settings.data_dir, settled_elsewhere=STATION_KINDS)
         self.engine = engine or ProcessEngine(settings.cancel_grace_s)
-        self.bell = Bell()
-        self.cancels = Cancels(self.store, self.bell)
+        self.notifier = Notifier()
+        self.cancels = Cancels(self.store, self.notifier)
         self.jobs = JobManager(
-            self.store, self.engine, kinds, self.bell, self.cancels, settings.jobs_at_once
+            self.store, self.engine, kinds, self.notifier, self.cancels, settings.jobs_at_once
         )
-        books = Books(self.store, self.bell, self.cancels)
-        self.rigs = RigDesks(stations, settings.sessions_folder, books)
+        context = WorkerContext(self.store, self.notifier, self.cancels)
+        self.rigs = StationRegistry(stations, settings.sessions_folder, context)
         self.stopping = threading.Event()
         self.imports = CapacityLimiter(_IMPORTS_AT_ONCE)
 
@@ -52,7 +55,7 @@ class Service:
     def announce_stop(self) -> None:
         """End what would keep connections open: event streams and imports of scans."""
         self.stopping.set()
-        self.bell.close()
+        self.notifier.close()
 
     def stop(self) -> None:
         """Stop all work; jobs that run are marked interrupted."""

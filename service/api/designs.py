@@ -2,30 +2,25 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated
 
 from fastapi import APIRouter, Response
 from pydantic import Field
 
-from rig.specification.rigfile import RigFile
 from service.api.context import ServiceDep
 from service.api.job_routes import JobResource
-from service.api.models import LARGEST_JSON_INTEGER, IdempotencyKeyHeader, Job, Model, problems
-from service.api.results import DesignResult
-from service.api.submission import rig_for_scan, submit
+from service.api.models import IdempotencyKeyHeader, Job, problems
+from service.api.submission import Submission, asked, rig_for_scan, submit
+from service.kinds.base import Model
+from service.kinds.design import DESIGN, DesignRequest, DesignResult
 
 router = APIRouter(tags=["designs"])
 
 
-class DesignRequest(Model):
-    """What to design. ``cameras`` and ``seed`` override those of the rig."""
+class DesignBody(DesignRequest):
+    """What to design, and for which scan."""
 
     scan_id: Annotated[str, Field(max_length=100)]
-    rig: Annotated[RigFile, Field(description="The structure of a rig file, as JSON.")]
-    cameras: Annotated[
-        int | None, Field(ge=1, le=500, description="How many cameras to place.")
-    ] = None
-    seed: Annotated[int | None, Field(ge=0, le=LARGEST_JSON_INTEGER)] = None
 
 
 class DesignJob(Job[DesignResult]):
@@ -39,7 +34,7 @@ class DesignPage(Model):
     next: int | None
 
 
-resource = JobResource("design", "designs", DesignJob, DesignPage)
+resource = JobResource(DESIGN, "designs", DesignJob, DesignPage)
 
 
 @router.post(
@@ -49,16 +44,17 @@ resource = JobResource("design", "designs", DesignJob, DesignPage)
     responses=problems(400, 404, 409, 413, 422, 503, 507),
 )
 def add_design(
-    request: DesignRequest,
+    body: DesignBody,
     response: Response,
     service: ServiceDep,
     idempotency_key: IdempotencyKeyHeader = None,
-) -> dict[str, Any]:
+) -> Job[DesignResult]:
     """Ask for a design. Limits that cannot be are refused at once."""
-    scan = service.store.scans.get(request.scan_id)
-    given = {"cameras": request.cameras, "seed": request.seed}
-    rig = rig_for_scan(request.rig, scan, {k: v for k, v in given.items() if v is not None})
-    return submit(service, resource, {"rig": rig}, idempotency_key, response, scan=scan)
+    scan = service.store.scans.get(body.scan_id)
+    request = asked(DesignRequest, body)
+    request = request.model_copy(update={"rig": rig_for_scan(request.rig, scan)})
+    request.spec()
+    return submit(service, resource, Submission(request, scan), idempotency_key, response)
 
 
 resource.add_to(router)

@@ -14,9 +14,9 @@ from starlette.routing import Match
 
 from common.errors import InputError, InternalError, RigwrightError
 from common.files.strict import unknown_key
+from service.ipc import error_from_fields
 from service.logs import log
 from service.problems import HTTP_ERRORS, MEDIA_TYPE, problem_document
-from service.wire import error_from_fields
 
 _RETRY_AFTER_S = "5"
 

@@ -2,34 +2,27 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated
 
 from fastapi import APIRouter, Response
 from pydantic import Field
 
 from rig.design.designfile import design_from_mapping
 from rig.design.designmodel import DesignFile
-from rig.specification.rigfile import RigFile, rig_from_mapping
 from service.api.context import ServiceDep
 from service.api.job_routes import JobResource
-from service.api.models import IdempotencyKeyHeader, Job, Model, problems
-from service.api.results import EvaluationResult
-from service.api.submission import rig_for_scan, submit
+from service.api.models import IdempotencyKeyHeader, Job, problems
+from service.api.submission import Submission, rig_for_scan, submit
+from service.kinds.base import Model
+from service.kinds.evaluation import EVALUATION, EvaluationRequest, EvaluationResult
 
 router = APIRouter(tags=["evaluations"])
 
 
-class EvaluationRequest(Model):
-    """What to score: the cameras of ``design`` against the limits of ``rig``."""
+class EvaluationBody(EvaluationRequest):
+    """What to score, and on which scan."""
 
     scan_id: Annotated[str, Field(max_length=100)]
-    rig: Annotated[RigFile, Field(description="The structure of a rig file, as JSON.")]
-    design: Annotated[
-        DesignFile,
-        Field(
-            description="A design document; of an existing rig `schema` and `cameras` are enough."
-        ),
-    ]
 
 
 class EvaluationJob(Job[EvaluationResult]):
@@ -43,7 +36,7 @@ class EvaluationPage(Model):
     next: int | None
 
 
-resource = JobResource("evaluation", "evaluations", EvaluationJob, EvaluationPage)
+resource = JobResource(EVALUATION, "evaluations", EvaluationJob, EvaluationPage)
 
 
 @router.post(
@@ -53,21 +46,21 @@ resource = JobResource("evaluation", "evaluations", EvaluationJob, EvaluationPag
     responses=problems(400, 404, 409, 413, 422, 503, 507),
 )
 def add_evaluation(
-    request: EvaluationRequest,
+    body: EvaluationBody,
     response: Response,
     service: ServiceDep,
     idempotency_key: IdempotencyKeyHeader = None,
-) -> dict[str, Any]:
+) -> Job[EvaluationResult]:
     """Ask for an evaluation."""
-    scan = service.store.scans.get(request.scan_id)
-    rig = rig_for_scan(request.rig, scan, {})
+    scan = service.store.scans.get(body.scan_id)
+    rig = rig_for_scan(body.rig, scan)
     # Only what places the cameras: the figures of the old design would be stored for nothing.
-    design = request.design.model_dump(
+    placed = body.design.model_dump(
         by_alias=True, exclude_unset=True, include={"schema_", "name", "cameras"}
     )
-    design_from_mapping(design, "design", rig_from_mapping(rig).camera)
-    content = {"rig": rig, "design": design}
-    return submit(service, resource, content, idempotency_key, response, scan=scan)
+    design_from_mapping(placed, "design", rig.to_spec().camera)
+    request = EvaluationRequest(rig=rig, design=DesignFile.model_validate(placed))
+    return submit(service, resource, Submission(request, scan), idempotency_key, response)
 
 
 resource.add_to(router)

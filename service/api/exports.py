@@ -13,8 +13,9 @@ from rig.design.designfile import read_design
 from service.api.calibrations import resource as calibrations
 from service.api.context import ServiceDep
 from service.api.designs import resource as designs
-from service.api.models import Model, problems
-from service.api.zipped import JSON, ZIP, zipped
+from service.api.models import problems
+from service.api.zipped import ZIP, zipped
+from service.kinds.base import Model
 
 router = APIRouter(tags=["exports"])
 
@@ -35,32 +36,33 @@ class ExportList(Model):
 
 
 @router.get(designs.path + "/{job_id}/exports", response_model=ExportList, responses=problems(404))
-def list_exports(service: ServiceDep, job_id: str) -> JSON:
+def list_exports(service: ServiceDep, job_id: str) -> ExportList:
     """List the programs a design's cameras can be written for."""
-    service.store.jobs.get(job_id, designs.kind)
+    service.store.jobs.get(job_id, designs.kind.name)
     return _formats(f"{designs.path}/{job_id}/exports")
 
 
 @router.get(
     calibrations.path + "/{job_id}/exports", response_model=ExportList, responses=problems(404)
 )
-def list_calibration_exports(service: ServiceDep, job_id: str) -> JSON:
+def list_calibration_exports(service: ServiceDep, job_id: str) -> ExportList:
     """List the programs calibrated cameras can be written for."""
-    service.store.jobs.get(job_id, calibrations.kind)
+    service.store.jobs.get(job_id, calibrations.kind.name)
     return _formats(f"{calibrations.path}/{job_id}/exports")
 
 
-def _formats(path: str) -> JSON:
-    items = [
-        {
-            "name": form.name,
-            "program": form.program,
-            "description": form.description,
-            "href": f"{path}/{form.name}",
-        }
-        for form in FORMATS.values()
-    ]
-    return {"items": items}
+def _formats(path: str) -> ExportList:
+    return ExportList(
+        items=[
+            ExportFormat(
+                name=form.name,
+                program=form.program,
+                description=form.description,
+                href=f"{path}/{form.name}",
+            )
+            for form in FORMATS.values()
+        ]
+    )
 
 
 @router.get(

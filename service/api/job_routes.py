@@ -2,7 +2,8 @@
 
 # No postponed annotations here: FastAPI could not resolve those that name a local dependency.
 from collections.abc import AsyncIterator, Callable
-from typing import Annotated, Any
+from datetime import datetime
+from typing import Annotated, Generic
 
 from anyio import to_thread
 from fastapi import APIRouter, Depends
@@ -12,15 +13,26 @@ from pydantic import BaseModel
 
 from common.errors import ConflictError, NotFoundError
 from service.api.context import Service, ServiceDep
-from service.api.models import Cursor, File, FileList, LastEventIdHeader, Limit, problems
+from service.api.models import (
+    Cursor,
+    File,
+    FileList,
+    Job,
+    JobProgress,
+    LastEventIdHeader,
+    Limit,
+    Problem,
+    problems,
+)
+from service.api.responses import Responses
+from service.kinds.base import JobKind, RequestT, ResultT
 from service.problems import stored_problem
 from service.store.jobrecords import JobEvent, JobRecord
 
-JSON = dict[str, Any]
 _TERMINAL = ("completed", "failed", "cancelled", "interrupted")
 
 
-class JobResource:
+class JobResource(Generic[RequestT, ResultT]):
     """The routes of one kind of job under ``/v1/<plural>``.
 
     ``with_files`` says whether such jobs leave files of their own.
@@ -28,9 +40,9 @@ class JobResource:
 
     def __init__(
         self,
-        kind: str,
+        kind: JobKind[RequestT, ResultT],
         plural: str,
-        model: type[BaseModel],
+        model: type[Job[ResultT]],
         page: type[BaseModel],
         *,
         with_files: bool = True,
@@ -41,25 +53,28 @@ class JobResource:
         self._page = page
         self._with_files = with_files
 
-    def document(self, job: JobRecord) -> JSON:
+    def location(self, job: JobRecord) -> str:
+        """The path of a job."""
+        return f"{self.path}/{job.id}"
+
+    def document(self, job: JobRecord) -> Job[ResultT]:
         """A job as it goes over HTTP."""
-        own = f"{self.path}/{job.id}"
+        own = self.location(job)
         words = ("events", "cancel", "files") if self._with_files else ("events", "cancel")
-        links = {name: f"{own}/{name}" for name in words}
-        return {
-            "id": job.id,
-            "kind": job.kind,
-            "status": job.status,
-            "scan_id": job.scan_id,
-            "cancel_requested": job.cancel_requested,
-            "created_at": job.created_at,
-            "started_at": job.started_at,
-            "ended_at": job.ended_at,
-            "progress": job.progress,
-            "result": job.result,
-            "problem": stored_problem(job.problem),
-            "links": {"self": own, **links},
-        }
+        return self._model(
+            id=job.id,
+            kind=job.kind,
+            status=job.status,
+            scan_id=job.scan_id,
+            cancel_requested=job.cancel_requested,
+            created_at=datetime.fromisoformat(job.created_at),
+            started_at=_time(job.started_at),
+            ended_at=_time(job.ended_at),
+            progress=None if job.progress is None else JobProgress.model_validate(job.progress),
+            result=self.kind.result_from_row(job.result),
+            problem=problem_of(job.problem),
+            links={"self": own} | {name: f"{own}/{name}" for name in words},
+        )
 
     def add_to(self, router: APIRouter) -> None:
         """Add the routes that all kinds of jobs have."""
@@ -71,23 +86,25 @@ class JobResource:
 
     def _add_reading(self, router: APIRouter) -> None:
         @router.get(self.path, response_model=self._page, responses=problems(422))
-        def list_jobs(service: ServiceDep, limit: Limit = 50, cursor: Cursor = None) -> JSON:
+        def list_jobs(service: ServiceDep, limit: Limit = 50, cursor: Cursor = None) -> BaseModel:
             """List jobs, newest first."""
-            found = service.store.jobs.page(self.kind, limit + 1, cursor)
+            found = service.store.jobs.page(self.kind.name, limit + 1, cursor)
             shown = found[:limit]
-            return {
-                "items": [self.document(job) for job in shown],
-                "next": shown[-1].seq if len(found) > limit else None,
-            }
+            return self._page.model_validate(
+                {
+                    "items": [self.document(job) for job in shown],
+                    "next": shown[-1].seq if len(found) > limit else None,
+                }
+            )
 
         @router.get(self.path + "/{job_id}", response_model=self._model, responses=problems(404))
-        def read_job(service: ServiceDep, job_id: str) -> JSON:
+        def read_job(service: ServiceDep, job_id: str) -> Job[ResultT]:
             """Read the status, progress and result of a job."""
-            return self.document(service.store.jobs.get(job_id, self.kind))
+            return self.document(service.store.jobs.get(job_id, self.kind.name))
 
     def _add_events(self, router: APIRouter) -> None:
         def existing(service: ServiceDep, job_id: str) -> JobRecord:
-            return service.store.jobs.get(job_id, self.kind)
+            return service.store.jobs.get(job_id, self.kind.name)
 
         @router.get(
             self.path + "/{job_id}/events",
@@ -114,20 +131,20 @@ class JobResource:
             response_model=self._model,
             responses=problems(404, 409),
         )
-        def cancel_job(service: ServiceDep, job_id: str) -> JSON:
+        def cancel_job(service: ServiceDep, job_id: str) -> Job[ResultT]:
             """Ask a job to stop. Asking again changes nothing; once it has ended: 409."""
-            return self.document(service.cancels.cancel(job_id, self.kind))
+            return self.document(service.cancels.cancel(job_id, self.kind.name))
 
         @router.delete(self.path + "/{job_id}", status_code=204, responses=problems(404, 409))
         def remove_job(service: ServiceDep, job_id: str) -> None:
             """Remove a job that has ended, with its files."""
-            service.store.jobs.remove(job_id, self.kind)
+            service.store.jobs.remove(job_id, self.kind.name)
 
     def _add_files(self, router: APIRouter) -> None:
         @router.get(self.path + "/{job_id}/files", response_model=FileList, responses=problems(404))
         def list_files(service: ServiceDep, job_id: str) -> FileList:
             """List the files a job made; none until it is completed."""
-            service.store.jobs.get(job_id, self.kind)
+            service.store.jobs.get(job_id, self.kind.name)
             items = [
                 File(
                     name=file.name,
@@ -166,7 +183,7 @@ class JobResource:
 
     def file(self, service: Service, job_id: str, name: str) -> FileResponse:
         """One file of a job. The name is looked up among the job's files, never used as a path."""
-        job = service.store.jobs.get(job_id, self.kind)
+        job = service.store.jobs.get(job_id, self.kind.name)
         if not job.status.terminal:
             raise ConflictError("job-active", "the job has not ended", "wait until it is completed")
         for file in service.store.jobs.files(job_id):
@@ -177,7 +194,7 @@ class JobResource:
         )
 
 
-def _any_file(media_type: str) -> dict[int | str, dict[str, Any]]:
+def _any_file(media_type: str) -> Responses:
     schema = {"type": "string", "format": "binary"}
     content = (
         {"application/json": {}}
@@ -188,8 +205,8 @@ def _any_file(media_type: str) -> dict[int | str, dict[str, Any]]:
 
 
 async def _events(service: Service, job_id: str, last: int) -> AsyncIterator[ServerSentEvent]:
-    with service.bell.listen(job_id) as news:
-        while not service.bell.closed:
+    with service.notifier.listen(job_id) as news:
+        while not service.notifier.closed:
             # Cleared before reading: what happens after the read then sets it again.
             news.clear()
             # Asked before reading as well: a job seen to have ended has all its events written.
@@ -214,7 +231,17 @@ def _goes_on(service: Service, job_id: str) -> bool:
 
 
 def _sent(event: JobEvent) -> ServerSentEvent:
-    data = dict(event.data)
-    if data.get("problem") is not None:
-        data["problem"] = stored_problem(data["problem"])
-    return ServerSentEvent(data=data | {"at": event.at}, event=event.type, id=str(event.id))
+    data = {**event.data, "at": event.at}
+    if event.problem is not None:
+        data["problem"] = stored_problem(event.problem)
+    return ServerSentEvent(data=data, event=event.type, id=str(event.id))
+
+
+def _time(stored: str | None) -> datetime | None:
+    return None if stored is None else datetime.fromisoformat(stored)
+
+
+def problem_of(stored: dict[str, str] | None) -> Problem | None:
+    """The problem of an error that the store has kept."""
+    document = stored_problem(stored)
+    return None if document is None else Problem.model_validate(document)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated
 
 from pydantic import Field, model_validator
 
@@ -11,15 +11,12 @@ from rig.acquisition.session.index import read_index
 from rig.acquisition.session.records import CaptureId
 from rig.acquisition.session.storage import Disk
 from service.api.context import Service
-from service.api.models import Model
 from service.api.picturesets import KIND as PICTURE_SET
 from service.api.targetsets import KIND as TARGET_SET
+from service.kinds.base import Id, Model, RunContext
 from service.pictures.listing import pictures_in_session
 from service.store.jobrecords import JobInput, JobRecord
 from service.store.tables import utc_now
-
-JSON = dict[str, Any]
-Id = Annotated[str, Field(min_length=1, max_length=100)]
 
 
 class Pictures(Model):
@@ -43,43 +40,22 @@ class Pictures(Model):
         return self
 
 
-class CameraPictures(Model):
-    """What detection found in one camera's pictures."""
+def picture_source(
+    service: Service, pictures: Pictures, reference: str = ""
+) -> tuple[RunContext, tuple[JobInput, ...]]:
+    """The part of a task's run, and its inputs, that name the pictures.
 
-    name: str
-    pictures: int
-    targets: int
-
-
-class RuleCount(Model):
-    """How many targets were seen and not used, by one rule of ``docs/how-to/targets.md``."""
-
-    rule: str
-    count: int
-
-
-class Detection(Model):
-    """What was found in all pictures."""
-
-    pictures: int
-    frames: int
-    targets: int
-    cameras: list[CameraPictures]
-    rejected: list[RuleCount]
-
-
-def picture_source(service: Service, pictures: Pictures) -> tuple[JSON, tuple[JobInput, ...]]:
-    """The part of a task's request, and its inputs, that name the pictures.
-
-    Raises :class:`NotFoundError` and :class:`~common.errors.InputError` for what is not there.
+    ``reference``: the calibration they are compared with. Raises :class:`NotFoundError` and
+    :class:`~common.errors.InputError` for what is not there.
     """
+    run = RunContext(made_utc=utc_now(), reference=reference)
     if pictures.picture_set_id is not None:
         found = service.store.documents.get(PICTURE_SET, pictures.picture_set_id)
-        return {}, (found.as_input("pictures"),)
+        return run, (found.as_input("pictures"),)
     folder = service.rigs.session_folder(str(pictures.session))
     read_index(folder, Disk())
     pictures_in_session(folder, pictures.captures)
-    return {"session": str(folder), "captures": pictures.captures}, ()
+    return run.model_copy(update={"session": str(folder), "captures": pictures.captures}), ()
 
 
 def target_input(service: Service, target_set_id: str) -> JobInput:
@@ -108,8 +84,3 @@ def completed(service: Service, job_id: str, kind: str) -> JobRecord:
             f"give a completed {kind}",
         )
     return job
-
-
-def unsaid() -> JSON:
-    """What goes with a task that nobody asked for: when it was made."""
-    return {"made_utc": utc_now()}

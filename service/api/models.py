@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Generic, Literal, TypeVar
+from typing import Annotated, Generic
 
 from fastapi import Header, Query
-from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
+from pydantic import AwareDatetime, Field
 
+from service.api.responses import Responses
+from service.kinds.base import LARGEST_JSON_INTEGER, Model, ResultT
 from service.store.tables import JobStatus
-
-LARGEST_JSON_INTEGER = 2**53 - 1
-"""Beyond it JSON readers that use floating point, as browsers do, see another number."""
 
 Limit = Annotated[int, Query(ge=1, le=200, description="How many to list.")]
 Cursor = Annotated[
@@ -37,19 +36,6 @@ LastEventIdHeader = Annotated[
         description="The last event you have seen; the stream goes on after it.",
     ),
 ]
-
-
-class Model(BaseModel):
-    """Base of everything on the wire: unknown keys are errors."""
-
-    model_config = ConfigDict(extra="forbid")
-
-
-class Note(Model):
-    """Something that was inferred about a scan, changed in it, or looks odd."""
-
-    kind: Literal["inferred", "changed", "warning"]
-    text: str
 
 
 class Fault(Model):
@@ -79,9 +65,6 @@ class JobProgress(Model):
     iteration: int
     cost: float | None
     violation: float | None
-
-
-ResultT = TypeVar("ResultT")
 
 
 class Job(Model, Generic[ResultT]):
@@ -117,7 +100,7 @@ class FileList(Model):
     items: list[File]
 
 
-def problems(*statuses: int) -> dict[int | str, dict[str, Any]]:
+def problems(*statuses: int) -> Responses:
     """The documentation of error answers: problem details and nothing else."""
     schema = {"$ref": "#/components/schemas/Problem"}
     return {

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from dataclasses import replace
+from typing import Annotated
 
 from anyio import to_thread
 from fastapi import APIRouter, Query, Request, Response
@@ -10,14 +11,14 @@ from pydantic import AwareDatetime, Field
 
 from common.errors import InputError, InternalError
 from service.api.context import Service, ServiceDep
-from service.api.models import Cursor, Limit, Model, problems
+from service.api.models import Cursor, Limit, problems
 from service.api.receiving import died, read_apart, receive
-from service.jobs.engine import JobKind
+from service.kinds.base import Model
+from service.kinds.imports import PICTURES_IMPORT, PictureFacts, PicturesImportRequest
 from service.store.blobs import StagedFile
 from service.store.documents import DocumentRecord
 from service.store.scans import plain_name
 
-JSON = dict[str, Any]
 KIND = "picture-set"
 PATH = "/v1/picture-sets"
 router = APIRouter(tags=["picture sets"])
@@ -44,14 +45,15 @@ class PictureSetPage(Model):
 
 
 def _document(record: DocumentRecord) -> PictureSet:
+    facts = PictureFacts.model_validate(record.report)
     return PictureSet(
         id=record.id,
         sha256=record.sha256,
         filename=record.filename,
         size_bytes=record.size_bytes,
         created_at=record.created_at,  # type: ignore[arg-type]
-        cameras=record.report["cameras"],
-        frames=record.report["frames"],
+        cameras=facts.cameras,
+        frames=facts.frames,
         links={"self": f"{PATH}/{record.id}"},
     )
 
@@ -107,33 +109,34 @@ def _read_and_keep(
     service: Service, staged: StagedFile, filename: str
 ) -> tuple[DocumentRecord, bool]:
     settings = service.settings
-    kind = JobKind(
-        "picture-import",
-        "service.tasks.picturing:import_pictures",
+    kind = replace(
+        PICTURES_IMPORT,
         time_limit_s=settings.scan_time_limit_s,
         memory_limit_bytes=settings.scan_memory_limit_bytes,
     )
     name = plain_name(filename)
     try:
-        report = read_apart(service, kind, staged, name, {})
+        facts = read_apart(service, kind, PicturesImportRequest(), staged, name)
     except InternalError as error:
         if not died(error):
             raise
         raise InputError(
             "pictures-archive", f"{name} cannot be read", "pack the pictures again"
         ) from error
-    return service.store.documents.add(KIND, staged, name, report)
+    return service.store.documents.add(KIND, staged, name, kind.result_row(facts))
 
 
 @router.get(PATH, response_model=PictureSetPage, responses=problems(422))
-def list_picture_sets(service: ServiceDep, limit: Limit = 50, cursor: Cursor = None) -> JSON:
+def list_picture_sets(
+    service: ServiceDep, limit: Limit = 50, cursor: Cursor = None
+) -> PictureSetPage:
     """List picture sets, newest first."""
     found = service.store.documents.page(KIND, limit + 1, cursor)
     shown = found[:limit]
-    return {
-        "items": [_document(record) for record in shown],
-        "next": shown[-1].seq if len(found) > limit else None,
-    }
+    return PictureSetPage(
+        items=[_document(record) for record in shown],
+        next=shown[-1].seq if len(found) > limit else None,
+    )
 
 
 @router.get(PATH + "/{picture_set_id}", response_model=PictureSet, responses=problems(404))

@@ -2,117 +2,26 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
-
 from fastapi import APIRouter, Response
-from pydantic import Field
 
-from rig.build.mounts.systemfile import SystemFile, system_from_mapping
+from rig.catalogue import load_catalogue
 from service.api.context import ServiceDep
 from service.api.designs import resource as designs
 from service.api.job_routes import JobResource
-from service.api.measuring import Id, completed, made_file
-from service.api.models import LARGEST_JSON_INTEGER, IdempotencyKeyHeader, Job, Model, problems
-from service.api.submission import submit
+from service.api.measuring import completed, made_file
+from service.api.models import IdempotencyKeyHeader, Job, problems
+from service.api.submission import Submission, asked, submit
 from service.api.zipped import ZIP, zipped
+from service.kinds.base import Id, Model
+from service.kinds.plan import PLAN, PlanRequest, PlanResult
 
-JSON = dict[str, Any]
 router = APIRouter(tags=["plans"])
 
 
-class PlanRequest(Model):
-    """What to plan: a mount for the cameras of a design."""
+class PlanBody(PlanRequest):
+    """What to plan, and for which design."""
 
     design_id: Id
-    mount: Annotated[SystemFile, Field(description="The structure of a system file, as JSON.")]
-    name: Annotated[str, Field(max_length=100, description="What to call it.")] = ""
-    seed: Annotated[
-        int, Field(ge=0, le=LARGEST_JSON_INTEGER, description="Of the trials of tolerances.")
-    ] = 0
-    paper: Annotated[Literal["A4", "A3"], Field(description="Of drilling templates.")] = "A4"
-
-
-class PlanNetwork(Model):
-    """What a network of poses is worth."""
-
-    sigma_median_mm: float | None
-    sigma_p95_mm: float | None
-    coverage_2_views: float
-    coverage_3_views: float
-    feasible: bool
-    broken: list[str]
-
-
-class PlanPrice(Model):
-    """What building costs: as designed, rounded one by one, and re-optimised."""
-
-    designed: PlanNetwork
-    rounded: PlanNetwork
-    built: PlanNetwork
-    sigma_loss: Annotated[float | None, Field(description="Share of the median sigma.")]
-    coverage_loss: Annotated[float | None, Field(description="Share of points with two views.")]
-
-
-class PlanClash(Model):
-    """Two things that overlap, or one that stands in a view."""
-
-    kind: str
-    one: str
-    other: str
-    clearance_mm: float | None
-    required_mm: float | None
-
-
-class PlanTolerance(Model):
-    """How far a setting may be off, alone; null: farther than was tried."""
-
-    camera: str
-    setting: str
-    unit: str
-    plus: float | None
-    minus: float | None
-    limit: str
-
-
-class PlanSetting(Model):
-    """One figure to set. ``step`` 0: made to the figure."""
-
-    name: str
-    value: float
-    unit: str
-    step: float
-
-
-class PlanCamera(Model):
-    """How one camera is set."""
-
-    name: str
-    settings: list[PlanSetting]
-
-
-class PlanResult(Model):
-    """A plan in short; its files hold the rest."""
-
-    name: str
-    system: str
-    buildable: Annotated[bool, Field(description="Whether nothing clashes.")]
-    clashes: list[PlanClash]
-    price: PlanPrice
-    yield_share: Annotated[
-        float | None, Field(description="Share of rigs built with small errors that keep limits.")
-    ]
-    yield_trials: int
-    tightest: Annotated[
-        list[PlanTolerance], Field(description="Of each kind of setting the tightest.")
-    ]
-    members: int
-    member_length_mm: float
-    plates: int
-    wedges: int
-    parts: int
-    cameras: list[PlanCamera]
-    steps: Annotated[list[str], Field(description="How to put it together, in order.")]
-    notes: list[str]
 
 
 class PlanJob(Job[PlanResult]):
@@ -126,7 +35,7 @@ class PlanPage(Model):
     next: int | None
 
 
-resource = JobResource("plan", "plans", PlanJob, PlanPage)
+resource = JobResource(PLAN, "plans", PlanJob, PlanPage)
 
 
 @router.post(
@@ -136,25 +45,18 @@ resource = JobResource("plan", "plans", PlanJob, PlanPage)
     responses=problems(400, 404, 409, 413, 422, 503, 507),
 )
 def add_plan(
-    request: PlanRequest,
+    body: PlanBody,
     response: Response,
     service: ServiceDep,
     idempotency_key: IdempotencyKeyHeader = None,
-) -> JSON:
+) -> Job[PlanResult]:
     """Ask for a mount plan of a completed design. The design's scan must still be here."""
-    design = completed(service, request.design_id, designs.kind)
+    design = completed(service, body.design_id, designs.kind.name)
     scan = service.store.scans.get(design.scan_id or "")
-    mount = request.mount.model_dump(mode="json", by_alias=True, exclude_unset=True)
-    system_from_mapping(mount)
-    file = made_file(service, request.design_id, designs.kind, "design.json", "design")
-    content = {
-        "mount": mount,
-        "name": request.name,
-        "seed": request.seed,
-        "paper": request.paper,
-        "step": False,
-    }
-    return submit(service, resource, content, idempotency_key, response, scan=scan, inputs=(file,))
+    request = asked(PlanRequest, body)
+    request.mount.checked(load_catalogue())
+    file = made_file(service, body.design_id, designs.kind.name, "design.json", "design")
+    return submit(service, resource, Submission(request, scan, (file,)), idempotency_key, response)
 
 
 @router.get(
@@ -162,7 +64,7 @@ def add_plan(
 )
 def read_archive(service: ServiceDep, job_id: str) -> Response:
     """Fetch all files of a plan in one ZIP archive."""
-    completed(service, job_id, resource.kind)
+    completed(service, job_id, resource.kind.name)
     files = {file.name: file.path.read_bytes() for file in service.store.jobs.files(job_id)}
     return zipped(files, "plan.zip")
 

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import secrets
 import shutil
-from typing import Any
 
 from anyio import to_thread
 from fastapi import Request
 from starlette.requests import ClientDisconnect
 
 from common.errors import CancelledError, InputError, InternalError, TooLargeError
+from common.progress import ignore_progress
 from service.api.context import Service
-from service.jobs.engine import JobKind, Task
+from service.jobs.engine import Task
+from service.kinds.base import JobKind, RequestT, ResultT
 from service.store.blobs import StagedFile, Staging
 
 _WRITE_BYTES = 1 << 20
@@ -62,8 +63,12 @@ def _too_large(limit: int, what: str) -> TooLargeError:
 
 
 def read_apart(
-    service: Service, kind: JobKind, staged: StagedFile, name: str, request: dict[str, Any]
-) -> dict[str, Any]:
+    service: Service,
+    kind: JobKind[RequestT, ResultT],
+    request: RequestT,
+    staged: StagedFile,
+    name: str,
+) -> ResultT:
     """Have a file from outside, which may be anything, read in a process with limits.
 
     The file is the task's input ``upload``, called ``name``. Raises what the task raises.
@@ -75,7 +80,7 @@ def read_apart(
             path.mkdir()
         link.symlink_to(staged.path.resolve())
         task = Task(kind, request, folder / "files", {"upload": link})
-        return service.engine.run(task, lambda _: None, service.stopping)
+        return service.engine.run(task, ignore_progress, service.stopping)
     except CancelledError:
         raise InternalError(
             "stopping", "the service is stopping", "send the file again later"

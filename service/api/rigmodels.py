@@ -6,11 +6,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from rig.acquisition.session.records import CaptureRecord, VerdictEntry
-from service.api.models import Model, Problem
-
-Identifier = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,63}$")]
-"""Becomes a file name: the same letters as the ids of captures."""
+from service.api.models import Problem
+from service.kinds.base import Figure, Model
 
 
 class TriggerStatus(Model):
@@ -23,9 +20,9 @@ class TriggerStatus(Model):
     boots: int | None
     interlock_closed: bool | None
     armed_capture: str | None
-    clock_residual_us: float | None
-    round_trip_p50_ms: float | None
-    round_trip_p99_ms: float | None
+    clock_residual_us: Figure
+    round_trip_p50_ms: Figure
+    round_trip_p99_ms: Figure
     counters: dict[str, int]
     last_problem: str
 
@@ -59,102 +56,3 @@ class RigList(Model):
     """The rigs of this service."""
 
     items: list[RigStatus]
-
-
-class CaptureRequest(Model):
-    """One capture. Sent again with the same `capture_id`, nothing is fired a second time."""
-
-    capture_id: Annotated[Identifier, Field(description="A name you choose, never used before.")]
-    session: Annotated[
-        Identifier | None,
-        Field(
-            description="The session to file it in, begun if there is none of that name. Without "
-            "it the capture gets a session of its own, named like the capture."
-        ),
-    ] = None
-    subject: Annotated[str, Field(max_length=200, description="For a new session.")] = ""
-    operator: Annotated[str, Field(max_length=200, description="For a new session.")] = ""
-    shots: Annotated[int, Field(ge=1, le=1000)] = 1
-    interval_us: Annotated[
-        float, Field(ge=0.0, le=1e9, allow_inf_nan=False, description="From shot to shot.")
-    ] = 0.0
-    allow_partial: Annotated[
-        bool | None,
-        Field(description="Whether cameras may be missing; as the station says without it."),
-    ] = None
-
-
-class CaptureOutcome(Model):
-    """A committed capture. Its pictures are files of the session."""
-
-    session: str
-    record: CaptureRecord
-
-
-class RigTestRequest(Model):
-    """A test of a rig; the first two fire nothing.
-
-    `self-test` looks at box, clock, interlock, every camera and the disk. `dry-run` does all
-    that a capture does up to FIRE. `sync-check` fires, files nothing, and tells each camera's lag.
-    """
-
-    test: Literal["self-test", "dry-run", "sync-check"]
-    captures: Annotated[int, Field(ge=1, le=100, description="Of a `sync-check`.")] = 3
-    adopt: Annotated[
-        bool, Field(description="Whether a `sync-check` writes its delays to the station file.")
-    ] = False
-    allow_partial: Annotated[bool | None, Field(description="Of a `dry-run`.")] = None
-
-
-class CheckLine(Model):
-    """One thing that was looked at."""
-
-    name: str
-    ok: bool
-    text: str
-
-
-class FaultLine(Model):
-    """One thing that went wrong."""
-
-    kind: str
-    text: str
-    camera: str | None
-    shot: int | None
-
-
-class LagLine(Model):
-    """A camera's lag from its edge to its exposure."""
-
-    camera: str
-    lag_us: float
-    jitter_us: float | None
-    uncertainty_us: float
-    count: int
-    exposure_us: float | None
-    source: str
-
-
-class TimingLine(Model):
-    """The delay that makes up for a camera's lag."""
-
-    delay_us: float
-    expected_lag_us: float
-
-
-class RigTestOutcome(Model):
-    """What a test found; lists that do not belong to the test are empty."""
-
-    test: Literal["self-test", "dry-run", "sync-check"]
-    ok: bool
-    checks: list[CheckLine] = Field(default_factory=list)
-    ready: Annotated[list[str], Field(description="Cameras that were ready.")] = Field(
-        default_factory=list
-    )
-    seconds: float | None = None
-    verdicts: list[VerdictEntry] = Field(default_factory=list)
-    faults: list[FaultLine] = Field(default_factory=list)
-    lags: dict[str, LagLine] = Field(default_factory=dict)
-    timings: dict[str, TimingLine] | None = None
-    why_not: str = ""
-    adopted: bool = False

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import uuid
-from typing import Any
+from functools import partial
 
 from fastapi import APIRouter, Response
 
 from service.api.context import ServiceDep
 from service.api.job_routes import JobResource
-from service.api.models import Job, Model, problems
-from service.api.rigmodels import RigTestOutcome, RigTestRequest
-from service.rigs.orders import TEST, test_order
-from service.store.jobrecords import NewJob
+from service.api.models import Job, problems
+from service.kinds.base import Model
+from service.kinds.rigs import RIG_TEST, RigTestOutcome, RigTestRequest
+from service.stations.jobs import run_test
+from service.stations.worker import StationWork
 
 router = APIRouter(tags=["rig tests"])
 
@@ -28,7 +29,7 @@ class RigTestPage(Model):
     next: int | None
 
 
-resource = JobResource(TEST, "rig-tests", RigTestJob, RigTestPage, with_files=False)
+resource = JobResource(RIG_TEST, "rig-tests", RigTestJob, RigTestPage, with_files=False)
 
 
 @router.post(
@@ -39,15 +40,12 @@ resource = JobResource(TEST, "rig-tests", RigTestJob, RigTestPage, with_files=Fa
 )
 def add_test(
     request: RigTestRequest, response: Response, service: ServiceDep, rig: str
-) -> dict[str, Any]:
+) -> Job[RigTestOutcome]:
     """Test a rig, now. 409 while it is busy, 503 when it is not open."""
-    content = request.model_dump()
-    record, _ = service.rigs.get(rig).begin(
-        NewJob(TEST, {"rig": rig, **content}), str(uuid.uuid4()), test_order(content)
-    )
-    document = resource.document(record)
-    response.headers["Location"] = document["links"]["self"]
-    return document
+    work = StationWork(RIG_TEST, partial(run_test, request))
+    record, _ = service.rigs.get(rig).begin(request, str(uuid.uuid4()), work)
+    response.headers["Location"] = resource.location(record)
+    return resource.document(record)
 
 
 resource.add_to(router)

@@ -9,7 +9,7 @@ from fastapi import APIRouter
 
 from rig.design.designfile import program_version
 from service.api.context import ServiceDep
-from service.api.models import Model
+from service.kinds.base import Model
 from service.store.tables import JobStatus
 
 router = APIRouter(tags=["service"])

@@ -9,14 +9,16 @@ from pydantic import AwareDatetime, Field
 
 from rig.specification.sections.subject import Axis
 from service.api.context import ServiceDep
-from service.api.models import Cursor, IdempotencyKeyHeader, Limit, Model, Note, problems
+from service.api.models import Cursor, IdempotencyKeyHeader, Limit, problems
 from service.api.uploads import Upload, take_in
+from service.kinds.base import Model
+from service.kinds.imports import ScanFacts
 from service.store.scans import ScanRecord
 
 router = APIRouter(tags=["scans"])
 
 
-class Scan(Model):
+class Scan(ScanFacts):
     """An uploaded scan. The same file, read with the same options, is the same scan."""
 
     id: str
@@ -29,12 +31,6 @@ class Scan(Model):
         dict[str, str | float],
         Field(description="How to read it, as given; a rig file may override."),
     ]
-    vertices: int
-    faces: Annotated[int, Field(description="0 for a point cloud.")]
-    extents_mm: Annotated[
-        list[float], Field(description="Width, depth and height in the rig frame.")
-    ]
-    notes: list[Note]
     links: dict[str, str]
 
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import dataclasses
-from typing import Annotated, Any
+from typing import Annotated
 
 from fastapi import APIRouter
 from fastapi.responses import FileResponse
@@ -15,9 +14,9 @@ from rig.acquisition.session.records import CaptureRecord, SessionFile
 from rig.acquisition.session.storage import Disk
 from rig.acquisition.session.verify import verify_session
 from service.api.context import ServiceDep
-from service.api.models import Model, problems
+from service.api.models import problems
+from service.kinds.base import Model
 
-JSON = dict[str, Any]
 router = APIRouter(tags=["sessions"])
 
 
@@ -53,10 +52,10 @@ class SessionProof(Model):
 
 
 @router.get("/v1/sessions", response_model=SessionList)
-def list_sessions(service: ServiceDep) -> JSON:
+def list_sessions(service: ServiceDep) -> SessionList:
     """List the sessions."""
     folders = service.rigs.session_folders()
-    return {"items": [{"name": f.name, "links": _links(f.name)} for f in folders]}
+    return SessionList(items=[SessionSummary(name=f.name, links=_links(f.name)) for f in folders])
 
 
 @router.get("/v1/sessions/{session}", response_model=SessionFile, responses=problems(404, 422))
@@ -85,10 +84,16 @@ def read_session_capture(service: ServiceDep, session: str, capture_id: str) -> 
 @router.post(
     "/v1/sessions/{session}/verify", response_model=SessionProof, responses=problems(404, 422)
 )
-def verify(service: ServiceDep, session: str) -> JSON:
+def verify(service: ServiceDep, session: str) -> SessionProof:
     """Prove a session whole, file by file. Takes as long as reading all of it."""
     check = verify_session(service.rigs.session_folder(session))
-    return {**dataclasses.asdict(check), "whole": check.whole}
+    return SessionProof(
+        whole=check.whole,
+        findings=[FindingLine(kind=f.kind, path=f.path, text=f.text) for f in check.findings],
+        captures=check.captures,
+        files=check.files,
+        bytes=check.bytes,
+    )
 
 
 @router.get(

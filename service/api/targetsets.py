@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from fastapi import APIRouter, Query, Response
 from pydantic import AwareDatetime, Field
@@ -14,12 +14,14 @@ from calibration.targets.kinds import TargetPlan
 from common.errors import NotFoundError
 from service.api.context import Service, ServiceDep
 from service.api.designs import resource as designs
-from service.api.models import Cursor, Limit, Model, problems
-from service.measuring.proposing import proposal_figures, proposal_for
-from service.measuring.sheets import sheets_of
+from service.api.models import Cursor, Limit, problems
+from service.kinds.base import Id, Model
+from service.kinds.defaults import PAGE
+from service.kinds.targets import SeenByCamera
 from service.store.documents import DocumentRecord
+from service.tasks.proposing import proposal_for, seen_by_cameras
+from service.tasks.sheets import sheets_of
 
-JSON = dict[str, Any]
 KIND = "target-set"
 PATH = "/v1/target-sets"
 router = APIRouter(tags=["target sets"])
@@ -49,16 +51,7 @@ class TargetSetPage(Model):
 class ProposalRequest(Model):
     """Whom to propose targets for."""
 
-    design_id: Annotated[str, Field(min_length=1, max_length=100)]
-
-
-class SeenByCamera(Model):
-    """What a camera sees of the targets that stand round the subject."""
-
-    camera: str
-    targets: int
-    cells: Annotated[int, Field(description="In how many ninths of its picture.")]
-    radius_px: Annotated[list[float], Field(description="Smallest and largest of their dots.")]
+    design_id: Id
 
 
 class ProposedTargets(Model):
@@ -125,23 +118,29 @@ def add_target_set(request: TargetsModel, response: Response, service: ServiceDe
     response_model=ProposedTargets,
     responses=problems(400, 404, 409, 413, 422, 507),
 )
-def propose(request: ProposalRequest, response: Response, service: ServiceDep) -> JSON:
+def propose(request: ProposalRequest, response: Response, service: ServiceDep) -> ProposedTargets:
     """Add a target set that suits a design: sizes, numbers and places for its cameras."""
     proposal = proposal_for(Path(designs.file(service, request.design_id, "design.json").path))
     record, _ = keep_targets(service, proposal.plan)
     response.headers["Location"] = f"{PATH}/{record.id}"
-    return {"target_set": _document(record), **proposal_figures(proposal)}
+    return ProposedTargets(
+        target_set=_document(record),
+        cameras=seen_by_cameras(proposal),
+        notes=list(proposal.notes),
+    )
 
 
 @router.get(PATH, response_model=TargetSetPage, responses=problems(422))
-def list_target_sets(service: ServiceDep, limit: Limit = 50, cursor: Cursor = None) -> JSON:
+def list_target_sets(
+    service: ServiceDep, limit: Limit = 50, cursor: Cursor = None
+) -> TargetSetPage:
     """List target sets, newest first."""
     found = service.store.documents.page(KIND, limit + 1, cursor)
     shown = found[:limit]
-    return {
-        "items": [_document(record) for record in shown],
-        "next": shown[-1].seq if len(found) > limit else None,
-    }
+    return TargetSetPage(
+        items=[_document(record) for record in shown],
+        next=shown[-1].seq if len(found) > limit else None,
+    )
 
 
 @router.get(PATH + "/{target_set_id}", response_model=TargetSet, responses=problems(404))
@@ -166,18 +165,18 @@ def read_target_file(service: ServiceDep, target_set_id: str) -> Response:
 @router.get(
     PATH + "/{target_set_id}/sheets", response_model=SheetList, responses=problems(404, 422)
 )
-def list_sheets(service: ServiceDep, target_set_id: str, page: Page = "A4") -> JSON:
+def list_sheets(service: ServiceDep, target_set_id: str, page: Page = PAGE) -> SheetList:
     """List what can be printed, and the pictures for simulations."""
     items = [
-        {
-            "name": sheet.name,
-            "carrier": sheet.carrier,
-            "media_type": sheet.media_type,
-            "href": f"{PATH}/{target_set_id}/sheets/{sheet.name}",
-        }
+        SheetEntry(
+            name=sheet.name,
+            carrier=sheet.carrier,
+            media_type=sheet.media_type,
+            href=f"{PATH}/{target_set_id}/sheets/{sheet.name}",
+        )
         for sheet in sheets_of(_plan(service, target_set_id), page).values()
     ]
-    return {"items": items}
+    return SheetList(items=items)
 
 
 @router.get(
@@ -186,7 +185,7 @@ def list_sheets(service: ServiceDep, target_set_id: str, page: Page = "A4") -> J
     responses=problems(404, 422)
     | {200: {"description": "The file.", "content": {"application/pdf": {}}}},
 )
-def read_sheet(service: ServiceDep, target_set_id: str, name: str, page: Page = "A4") -> Response:
+def read_sheet(service: ServiceDep, target_set_id: str, name: str, page: Page = PAGE) -> Response:
     """Fetch a sheet to print (PDF, SVG), or a picture of a carrier for simulations (PNG)."""
     sheets = sheets_of(_plan(service, target_set_id), page)
     if name not in sheets:

@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 import re
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import PurePosixPath
-from typing import Any
 
 from anyio import CancelScope, to_thread
 from fastapi import Request
 
 from common.errors import InputError, InternalError, NotFoundError
+from rig.specification.sections.subject import ScanSection
 from service.api.context import Service
 from service.api.receiving import died, read_apart, receive
-from service.jobs.engine import JobKind
+from service.kinds.imports import SCAN_IMPORT, ScanFacts, ScanImportRequest
 from service.store import idempotency
 from service.store.blobs import StagedFile
-from service.store.idempotency import IdempotencyKey
+from service.store.idempotency import IdempotencyKey, StoredAnswer
 from service.store.scans import ScanRecord, plain_name, scan_identity
 
 _SUFFIX = re.compile(r"^\.[a-z0-9]{1,8}$")
@@ -31,12 +31,12 @@ class Upload:
 
     filename: str
     media_type: str
-    options: dict[str, Any]
+    options: Mapping[str, str | float]
     idempotency_key: IdempotencyKey | None
 
     @classmethod
     def announced(
-        cls, request: Request, filename: str, options: dict[str, Any], key: str | None
+        cls, request: Request, filename: str, options: Mapping[str, str | float], key: str | None
     ) -> Upload:
         """From the request's line and headers. Raises :class:`InputError`."""
         name = PurePosixPath(filename.replace("\\", "/")).name
@@ -87,7 +87,7 @@ async def take_in(service: Service, request: Request, upload: Upload) -> tuple[S
 @asynccontextmanager
 async def _claimed(
     service: Service, key: IdempotencyKey | None
-) -> AsyncIterator[dict[str, Any] | None]:
+) -> AsyncIterator[StoredAnswer | None]:
     if key is None:
         yield None
         return
@@ -110,29 +110,29 @@ def _read_and_keep(service: Service, staged: StagedFile, upload: Upload) -> tupl
     try:
         report = service.store.scans.get(scan_id).report
     except NotFoundError:
-        report = _read(service, staged, upload)
+        report = SCAN_IMPORT.result_row(_read(service, staged, upload))
     return service.store.scans.add(
         staged,
         scan_id=scan_id,
         filename=upload.filename,
         media_type=upload.media_type,
-        options=upload.options,
+        options=dict(upload.options),
         report=report,
         idempotency_key=upload.idempotency_key,
     )
 
 
-def _read(service: Service, staged: StagedFile, upload: Upload) -> dict[str, Any]:
+def _read(service: Service, staged: StagedFile, upload: Upload) -> ScanFacts:
     settings = service.settings
-    kind = JobKind(
-        "scan-import",
-        "service.tasks.reading:import_scan",
+    kind = replace(
+        SCAN_IMPORT,
         time_limit_s=settings.scan_time_limit_s,
         memory_limit_bytes=settings.scan_memory_limit_bytes,
     )
+    request = ScanImportRequest(options=ScanSection.model_validate(upload.options))
     name = plain_name(upload.filename)
     try:
-        return read_apart(service, kind, staged, name, {"options": upload.options})
+        return read_apart(service, kind, request, staged, name)
     except InternalError as error:
         if not died(error):
             raise

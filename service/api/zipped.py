@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 from fastapi import Response
 
 from common.files.zip import zip_bytes
+from service.api.responses import Responses
 
-JSON = dict[Any, Any]
-
-ZIP: JSON = {
+ZIP: Responses = {
     200: {"description": "The files, as a ZIP archive.", "content": {"application/zip": {}}}
 }
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -69,17 +68,3 @@ ReferenceOption = Annotated[
         show_default=False,
     ),
 ]
-
-
-class LensParameter(StrEnum):
-    """The parameters of a lens."""
-
-    f = "f"
-    cx = "cx"
-    cy = "cy"
-    k1 = "k1"
-    k2 = "k2"
-    p1 = "p1"
-    p2 = "p2"
-    k3 = "k3"
-    b1 = "b1"

@@ -4,38 +4,34 @@ from __future__ import annotations
 
 import json
 import sys
-from typing import Any
+from collections.abc import Mapping
+from pathlib import Path
 
 from common.files.plain import plain
+from service.kinds.base import Result
 from service.problems import KINDS
 
-JSON = dict[str, Any]
 NOT_WELL = KINDS["device"].exit_code
 """The exit code of a command that found a device, or a rig, not to be well."""
 
 
-def print_json(document: JSON) -> None:
+def print_json(document: object) -> None:
     """One document, for machines."""
     sys.stdout.write(json.dumps(plain(document), indent=2) + "\n")
 
 
-def show(document: JSON, *, as_json: bool) -> None:
-    """A document as JSON, or as a line for each of its values."""
+def print_result_json(result: Result, files: Mapping[str, Path], **more: object) -> None:
+    """A result with where its files are, for machines."""
+    document = {"result": result.model_dump(mode="json", by_alias=True), **more}
+    print_json(document | {"files": {name: str(path) for name, path in files.items()}})
+
+
+def show(lines: Mapping[str, object], *, as_json: bool) -> None:
+    """Facts as JSON, or each on a line of its own."""
     if as_json:
-        print_json(document)
+        print_json(lines)
         return
-    for key, value in _lines(plain(document)):
-        sys.stdout.write(f"{key}: {value}\n")
-
-
-def _lines(document: JSON, prefix: str = "") -> list[tuple[str, str]]:
-    lines: list[tuple[str, str]] = []
-    for key, value in document.items():
-        name = f"{prefix}{key}".replace("_", " ")
-        if isinstance(value, dict):
-            lines += _lines(value, f"{name}, ")
-        elif isinstance(value, list):
-            lines += [(name, str(item)) for item in value] or [(name, "none")]
-        else:
-            lines.append((name, "unknown" if value is None else str(value)))
-    return lines
+    for name, value in lines.items():
+        for item in (value or ["none"]) if isinstance(value, list) else [value]:
+            text = "unknown" if item is None else str(item)
+            sys.stdout.write(f"{name.replace('_', ' ')}: {text}\n")

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
+import math
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
 
-from common.files.plain import plain
 from common.progress import Progress, ProgressCallback
 
-Report = Callable[[dict[str, Any]], None]
 _LINE_EVERY_S = 2.0
 
 
 @contextmanager
-def show_progress() -> Iterator[Report]:
+def show_progress() -> Iterator[ProgressCallback]:
     """Something to hand progress to."""
     if sys.stderr.isatty():
         with _bar() as report:
@@ -25,16 +23,16 @@ def show_progress() -> Iterator[Report]:
         yield _Lines()
 
 
-def _number(value: float | None, form: str) -> str:
-    return "-" if value is None else format(value, form)
+def _number(value: float, form: str) -> str:
+    return "-" if math.isnan(value) else format(value, form)
 
 
-def details(progress: dict[str, Any]) -> str:
+def details(progress: Progress) -> str:
     """Start, iteration, cost and violation, as far as they mean something now."""
-    if progress["start"] < 0:
+    if progress.start < 0:
         return ""
-    cost, violation = _number(progress["cost"], ".4g"), _number(progress["violation"], ".1e")
-    where = f"start {progress['start'] + 1}, iteration {progress['iteration']}"
+    cost, violation = _number(progress.cost, ".4g"), _number(progress.violation, ".1e")
+    where = f"start {progress.start + 1}, iteration {progress.iteration}"
     return f"{where}, cost {cost}, violation {violation}"
 
 
@@ -45,22 +43,20 @@ class _Lines:
         self._seen: set[tuple[str, int]] = set()
         self._written_s = 0.0
 
-    def __call__(self, progress: dict[str, Any]) -> None:
-        where, now_s = (progress["stage"], progress["start"]), time.monotonic()
+    def __call__(self, progress: Progress, /) -> None:
+        where, now_s = (progress.stage, progress.start), time.monotonic()
         if where in self._seen and now_s - self._written_s < _LINE_EVERY_S:
             return
         self._seen.add(where)
         self._written_s = now_s
         more = details(progress)
-        line = (
-            f"{100.0 * progress['fraction']:3.0f} % {progress['stage']}{': ' if more else ''}{more}"
-        )
+        line = f"{100.0 * progress.fraction:3.0f} % {progress.stage}{': ' if more else ''}{more}"
         sys.stderr.write(line + "\n")
         sys.stderr.flush()
 
 
 @contextmanager
-def _bar() -> Iterator[Report]:
+def _bar() -> Iterator[ProgressCallback]:
     from rich.console import Console
     from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeElapsedColumn
     from rich.progress import Progress as Bar
@@ -75,21 +71,12 @@ def _bar() -> Iterator[Report]:
     with Bar(*columns, console=Console(stderr=True), transient=True) as shown:
         bar = shown.add_task("starting", total=1.0, details="")
 
-        def report(progress: dict[str, Any]) -> None:
+        def report(progress: Progress, /) -> None:
             shown.update(
                 bar,
-                description=progress["stage"],
-                completed=progress["fraction"],
+                description=progress.stage,
+                completed=progress.fraction,
                 details=details(progress),
             )
 
         yield report
-
-
-def told(report: Report) -> ProgressCallback:
-    """The same for work in this process."""
-
-    def tell(progress: Progress, /) -> None:
-        report(plain(progress))
-
-    return tell

@@ -7,18 +7,20 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
 from typing import Any
 
 import typer
+from pydantic import ValidationError
 
 from common.errors import InputError, InternalError, RigwrightError
 from service.cli.progress import show_progress
-from service.jobs.engine import JobKind, Task
+from service.jobs.engine import Task
 from service.jobs.process import ProcessEngine
+from service.kinds.base import JobKind, RequestT, ResultT, RunContext
 from service.logs import log
 from service.problems import exit_code_of
 
@@ -31,6 +33,14 @@ def one_line_errors() -> Iterator[None]:
     log.propagate = False
     try:
         yield
+    except ValidationError as error:
+        # What an option's own limits let through, the request's do not.
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"])
+        message = first["msg"].removeprefix("Value error, ")
+        refused = InputError("request-invalid", f"{where}: {message}", "see --help")
+        sys.stderr.write(f"rigwright: {refused}\n")
+        raise typer.Exit(exit_code_of(refused)) from None
     except RigwrightError as error:
         if isinstance(error, InternalError):
             # A fault of ours: whoever reports it needs more than one line.
@@ -53,19 +63,33 @@ class _KeepRecords(logging.Handler):
 
 
 def run_task(
-    entry: str, request: Mapping[str, Any], inputs: Mapping[str, Path], folder: Path
-) -> dict[str, Any]:
+    kind: JobKind[RequestT, ResultT],
+    request: RequestT,
+    inputs: Mapping[str, Path],
+    folder: Path,
+    run: RunContext | None = None,
+) -> ResultT:
     """Do one piece of work in a process of its own, with progress on standard error.
 
     ``folder`` exists and is empty; what the work writes is left in it. The first Ctrl-C (or
     TERM) cancels.
     """
-    for path in inputs.values():
-        _require_file(path)
+    require_files(inputs.values())
     whole = {role: path.resolve() for role, path in inputs.items()}
-    task = Task(JobKind("command", entry), request, folder.resolve(), whole)
+    task = Task(kind, request, folder.resolve(), whole, run or RunContext())
     with cancel_on_signal() as cancel, show_progress() as report:
         return ProcessEngine().run(task, report, cancel)
+
+
+def processes(asked: int | None) -> int:
+    """How many processes may be used: as asked, or one per core."""
+    return asked or os.cpu_count() or 1
+
+
+def require_files(paths: Iterable[Path]) -> None:
+    """Raise :class:`InputError` for the first that is no file that can be read."""
+    for path in paths:
+        _require_file(path)
 
 
 def _require_file(path: Path) -> None:

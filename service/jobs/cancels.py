@@ -6,7 +6,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from service.jobs.bell import Bell
+from service.jobs.notifier import Notifier
 from service.store import Store
 from service.store.jobrecords import JobRecord
 
@@ -18,9 +18,9 @@ class Cancels:
     cancelled even where its event came too late to be heard.
     """
 
-    def __init__(self, store: Store, bell: Bell) -> None:
+    def __init__(self, store: Store, notifier: Notifier) -> None:
         self._store = store
-        self._bell = bell
+        self._notifier = notifier
         self._lock = threading.Lock()
         self._events: dict[str, threading.Event] = {}
 
@@ -46,7 +46,7 @@ class Cancels:
             event = self._events.get(job_id)
         if event is not None:
             event.set()
-        self._bell.ring(job_id)
+        self._notifier.notify(job_id)
         return record
 
     def stop_all(self) -> None:

@@ -1,4 +1,4 @@
-"""The process of one task: ``python -m service.jobs.child``.
+"""The process of one task, such as ``python -m service.tasks``.
 
 It reads the task from its standard input, which stays open: a further line asks it to stop, and
 the end of the input means that the service is gone, so that nothing is left running without
@@ -8,8 +8,6 @@ anybody to answer to. Messages go out on what was its standard output.
 from __future__ import annotations
 
 import errno
-import importlib
-import json
 import os
 import resource
 import signal
@@ -17,13 +15,17 @@ import sys
 import threading
 import time
 import traceback
-from pathlib import Path
+from collections.abc import Callable
 from typing import Any, BinaryIO
 
 from common.errors import CancelledError, InternalError, RigwrightError, TooLargeError
-from common.files.plain import plain
 from common.progress import Progress
-from service.wire import error_fields, line
+from service.ipc import TaskMessage, outcome_line, progress_line
+from service.jobs.engine import Running, Work
+from service.kinds.base import Result
+
+FindWork = Callable[[str], Work[Any, Any]]
+"""The work of a kind of job by its name: imports what it needs only then."""
 
 _PROGRESS_INTERVAL_S = 0.2
 
@@ -43,20 +45,20 @@ class _Reporter:
             return
         self._seen.add(where)
         self._sent_s = now_s
-        self._out.write(line({"progress": plain(progress)}))
+        self._out.write(progress_line(progress))
 
 
-def main() -> int:
+def main(find: FindWork) -> int:
     """Do the one task and say how it ended."""
     out = _take_standard_output()
-    task = json.loads(sys.stdin.buffer.readline())
+    message = TaskMessage(sys.stdin.buffer.readline())
     cancel = threading.Event()
     threading.Thread(target=_obey, args=(cancel,), daemon=True).start()
     os.nice(5)  # The service must go on answering while all cores are busy.
-    limit = task["memory_limit_bytes"]
+    limit = message.memory_limit_bytes
     if limit is not None:
         resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
-    out.write(line(_outcome(task, _Reporter(out), cancel)))
+    out.write(outcome_line(_outcome(find, message, Running(_Reporter(out), cancel))))
     return 0
 
 
@@ -74,44 +76,30 @@ def _obey(cancel: threading.Event) -> None:
     os.killpg(os.getpgrp(), signal.SIGKILL)
 
 
-def _outcome(task: dict[str, Any], report: _Reporter, cancel: threading.Event) -> dict[str, Any]:
-    module, _, name = task["entry"].partition(":")
-    inputs = {role: Path(path) for role, path in task["inputs"].items()}
+def _outcome(find: FindWork, message: TaskMessage, running: Running) -> Result | RigwrightError:
     try:
-        function = getattr(importlib.import_module(module), name)
-        if cancel.is_set():
+        work = find(message.kind_name)
+        if running.cancel.is_set():
             raise CancelledError
-        return {"result": function(task["request"], inputs, Path(task["folder"]), report, cancel)}
+        result: Result = work.function(message.task(work.kind), running)
+        return result
     except RigwrightError as error:
-        return {"error": error_fields(error)}
+        return error
     except MemoryError:
-        return {
-            "error": error_fields(
-                TooLargeError(
-                    "memory",
-                    "the work needs more memory than is allowed",
-                    "give a smaller scan or fewer points",
-                )
-            )
-        }
+        return TooLargeError(
+            "memory",
+            "the work needs more memory than is allowed",
+            "give a smaller scan or fewer points",
+        )
     except OSError as error:
         if error.errno not in (errno.ENOSPC, errno.EDQUOT):
             return _crashed()
-        return {
-            "error": error_fields(
-                InternalError("disk-full", "the disk is full", "make room, then try again")
-            )
-        }
+        return InternalError("disk-full", "the disk is full", "make room, then try again")
     except Exception:  # noqa: BLE001 - whatever it is, the service must hear that the task failed
         return _crashed()
 
 
-def _crashed() -> dict[str, Any]:
+def _crashed() -> InternalError:
     """The fault, told to the log in full and to the client in short."""
     traceback.print_exc()
-    fault = InternalError("job-crashed", "the work stopped on a fault", "see the log")
-    return {"error": error_fields(fault)}
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+    return InternalError("job-crashed", "the work stopped on a fault", "see the log")

@@ -2,7 +2,7 @@
 
 The service gives an engine a :class:`Task` and hears progress until the work has ended. Today
 the engine is a process per task on this machine; another one (a cluster) has to keep to the
-same few lines. An engine keeps no state that matters: the books are in the store.
+same few lines. An engine keeps no state that matters: that is in the store.
 """
 
 from __future__ import annotations
@@ -10,46 +10,49 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Generic, Protocol
 
-from common.progress import CancelToken
+from common.progress import CancelToken, ProgressCallback
+from service.kinds.base import JobKind, RequestT, ResultT, RunContext
 
 
 @dataclass(frozen=True)
-class JobKind:
-    """A kind of work.
+class Task(Generic[RequestT, ResultT]):
+    """One piece of work. ``inputs`` are files by role; ``folder`` is empty and its own.
 
-    ``entry`` is ``module:function``, called in the process of the task as
-    ``function(request, inputs, folder, report, cancel) -> result``. What the function writes
-    into ``folder`` is kept as the job's files. ``time_limit_s`` and ``memory_limit_bytes``
-    (address space) end work that takes too much; None: no limit.
+    What is written into ``folder`` is kept as the job's files.
     """
 
-    name: str
-    entry: str
-    time_limit_s: float | None = None
-    memory_limit_bytes: int | None = None
+    kind: JobKind[RequestT, ResultT]
+    request: RequestT
+    folder: Path
+    inputs: Mapping[str, Path] = field(default_factory=dict)
+    run: RunContext = field(default_factory=RunContext)
 
 
 @dataclass(frozen=True)
-class Task:
-    """One piece of work. ``inputs`` are files by role; ``folder`` is empty and its own."""
+class Running:
+    """A task's means while it runs: how to tell of progress, and whether to stop."""
 
-    kind: JobKind
-    request: Mapping[str, Any]
-    folder: Path
-    inputs: Mapping[str, Path] = field(default_factory=dict)
+    report: ProgressCallback
+    cancel: CancelToken
 
 
-Report = Callable[[dict[str, Any]], None]
-"""Receives progress as a JSON object."""
+@dataclass(frozen=True)
+class Work(Generic[RequestT, ResultT]):
+    """A kind of job with the function that does it, in the process of the task."""
+
+    kind: JobKind[RequestT, ResultT]
+    function: Callable[[Task[RequestT, ResultT], Running], ResultT]
 
 
 class Engine(Protocol):
     """Runs tasks."""
 
-    def run(self, task: Task, report: Report, cancel: CancelToken) -> dict[str, Any]:
-        """The task's result, a JSON object; returns only when nothing of the task runs any more.
+    def run(
+        self, task: Task[RequestT, ResultT], report: ProgressCallback, cancel: CancelToken
+    ) -> ResultT:
+        """The task's result; returns only when nothing of the task runs any more.
 
         Raises the :class:`~common.errors.RigwrightError` that the work raised,
         :class:`~common.errors.CancelledError` when ``cancel`` ended it,

@@ -18,14 +18,17 @@ from typing import Any
 from sqlalchemy.exc import SQLAlchemyError
 
 from common.errors import CancelledError, InternalError, RigwrightError
+from common.files.plain import plain
+from common.progress import Progress
 from service import logs
-from service.jobs.bell import Bell
+from service.ipc import error_fields
 from service.jobs.cancels import Cancels
-from service.jobs.engine import Engine, JobKind, Task
+from service.jobs.engine import Engine, Task
+from service.jobs.notifier import Notifier
+from service.kinds.base import JobKind, Result
 from service.store import Store, interrupted
 from service.store.jobrecords import JobRecord
 from service.store.tables import JobStatus
-from service.wire import error_fields
 
 _RETRY_S = 1.0
 _MEDIA_TYPES = mimetypes.MimeTypes()
@@ -45,15 +48,15 @@ class JobManager:
         self,
         store: Store,
         engine: Engine,
-        kinds: Mapping[str, JobKind],
-        bell: Bell,
+        kinds: Mapping[str, JobKind[Any, Any]],
+        notifier: Notifier,
         cancels: Cancels,
         at_once: int,
     ) -> None:
         self._store = store
         self._engine = engine
         self._kinds = kinds
-        self._bell = bell
+        self._notifier = notifier
         self._news = threading.Condition()
         self._stopping = False
         self._cancels = cancels
@@ -107,7 +110,7 @@ class JobManager:
         return None
 
     def _run(self, job: JobRecord) -> None:
-        self._bell.ring(job.id)
+        self._notifier.notify(job.id)
         logs.log.info("job started", extra={"fields": {"kind": job.kind}})
         folder = self._store.work_folder(job.id)
         try:
@@ -119,30 +122,38 @@ class JobManager:
             end_without_result(self._store, job.id, error)
         finally:
             shutil.rmtree(folder, ignore_errors=True)
-            self._bell.ring(job.id)
+            self._notifier.notify(job.id)
 
     def _give_up(self, job: JobRecord) -> None:
         lost = InternalError("job-lost", "the job could not be finished", "see the log")
         # Where even this cannot be written, the next start finds the job and marks it.
         with suppress(SQLAlchemyError):
             self._store.jobs.end(job.id, JobStatus.FAILED, error_fields(lost))
-            self._bell.ring(job.id)
+            self._notifier.notify(job.id)
 
-    def _work(self, job: JobRecord, folder: Path, cancel: threading.Event) -> dict[str, Any]:
+    def _kind(self, job: JobRecord) -> JobKind[Any, Any]:
         if job.kind not in self._kinds:
             raise InternalError(
                 "job-kind",
                 f"this version cannot do {job.kind!r} jobs",
                 "use the version that made the job",
             )
+        return self._kinds[job.kind]
+
+    def _work(self, job: JobRecord, folder: Path, cancel: threading.Event) -> Result:
+        kind = self._kind(job)
+        request, run = kind.from_row(job.request)
         (folder / "files").mkdir()
 
-        def report(progress: dict[str, Any]) -> None:
-            self._store.jobs.record_progress(job.id, progress)
-            self._bell.ring(job.id)
+        def report(progress: Progress, /) -> None:
+            self._store.jobs.record_progress(job.id, plain(progress))
+            self._notifier.notify(job.id)
 
-        task = Task(self._kinds[job.kind], job.request, folder / "files", self._inputs(job, folder))
-        return self._engine.run(task, report, cancel)
+        inputs = self._inputs(job, folder)
+        result: Result = self._engine.run(
+            Task(kind, request, folder / "files", inputs, run), report, cancel
+        )
+        return result
 
     def _inputs(self, job: JobRecord, folder: Path) -> dict[str, Path]:
         """Links to the job's files under their own names.
@@ -161,7 +172,7 @@ class JobManager:
             links[role].symlink_to(path.resolve())
         return links
 
-    def _keep(self, job: JobRecord, result: dict[str, Any], folder: Path) -> None:
+    def _keep(self, job: JobRecord, result: Result, folder: Path) -> None:
         files = {
             path.relative_to(folder).as_posix(): (
                 self._store.files.stage_existing(path),
@@ -170,7 +181,7 @@ class JobManager:
             for path in sorted(folder.rglob("*"))
             if path.is_file()
         }
-        self._store.jobs.complete(job.id, result, files)
+        self._store.jobs.complete(job.id, self._kind(job).result_row(result), files)
         logs.log.info("job completed")
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import select
 import signal
@@ -12,14 +11,16 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import IO, Any
+from typing import IO
 
 from common.errors import CancelledError, InternalError, RigwrightError, TooLargeError
-from common.progress import CancelToken
-from service.jobs.engine import Report, Task
+from common.progress import CancelToken, Progress, ProgressCallback
+from service.ipc import message_from_line, task_line
+from service.jobs.engine import Task
+from service.kinds.base import RequestT, ResultT
 from service.logs import log
-from service.wire import error_from_fields, line
 
+TASKS_PROGRAM = "service.tasks"
 _POLL_S = 0.05
 _ONE_THREAD = {
     "OMP_NUM_THREADS": "1",
@@ -36,18 +37,22 @@ class ProcessEngine:
     The numerical libraries' threads are set to one in the environment, before the process
     starts: they read it when they are loaded, and several tasks with a thread per core each
     would slow one another down many times over. ``cancel_grace_s``: how long a task may take to
-    stop by itself before it and everything it started is killed.
+    stop by itself before it and everything it started is killed. ``program``: the module that
+    does tasks when it is run.
     """
 
-    def __init__(self, cancel_grace_s: float = 0.8) -> None:
+    def __init__(self, cancel_grace_s: float = 0.8, program: str = TASKS_PROGRAM) -> None:
         self._cancel_grace_s = cancel_grace_s
+        self._program = program
 
-    def run(self, task: Task, report: Report, cancel: CancelToken) -> dict[str, Any]:
+    def run(
+        self, task: Task[RequestT, ResultT], report: ProgressCallback, cancel: CancelToken
+    ) -> ResultT:
         """See :class:`service.jobs.engine.Engine`."""
         if cancel.is_set():
             raise CancelledError
         with (task.folder.parent / f"{task.folder.name}.log").open("w+b") as log_file:
-            with _process(task, log_file) as process:
+            with _process(self._program, task, log_file) as process:
                 outcome = self._listen(process, task, report, cancel)
             _log_output(log_file)
         Path(log_file.name).unlink(missing_ok=True)
@@ -56,20 +61,22 @@ class ProcessEngine:
         return outcome
 
     def _listen(
-        self, process: subprocess.Popen[bytes], task: Task, report: Report, cancel: CancelToken
-    ) -> dict[str, Any] | RigwrightError:
+        self,
+        process: subprocess.Popen[bytes],
+        task: Task[RequestT, ResultT],
+        report: ProgressCallback,
+        cancel: CancelToken,
+    ) -> ResultT | RigwrightError:
         limit_s = task.kind.time_limit_s
         too_late_s = None if limit_s is None else time.monotonic() + limit_s
         kill_at_s = None
-        for message in _messages(process):
+        for line in _lines(process):
             now_s = time.monotonic()
-            if message is not None and "progress" in message:
-                report(message["progress"])
-            elif message is not None and "error" in message:
-                return error_from_fields(message["error"])
+            message = None if line is None else message_from_line(line, task.kind)
+            if isinstance(message, Progress):
+                report(message)
             elif message is not None:
-                result: dict[str, Any] = message["result"]
-                return result
+                return message
             if kill_at_s is None and cancel.is_set():
                 _ask_to_stop(process)
                 kill_at_s = now_s + self._cancel_grace_s
@@ -91,9 +98,11 @@ class ProcessEngine:
 
 
 @contextmanager
-def _process(task: Task, log_file: IO[bytes]) -> Iterator[subprocess.Popen[bytes]]:
-    process = subprocess.Popen(
-        [sys.executable, "-m", "service.jobs.child"],
+def _process(
+    program: str, task: Task[RequestT, ResultT], log_file: IO[bytes]
+) -> Iterator[subprocess.Popen[bytes]]:
+    process = subprocess.Popen(  # noqa: S603 - this interpreter, and a module of ours
+        [sys.executable, "-m", program],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=log_file,
@@ -102,7 +111,7 @@ def _process(task: Task, log_file: IO[bytes]) -> Iterator[subprocess.Popen[bytes
     )
     try:
         with suppress(BrokenPipeError):
-            _standard_input(process).write(_as_message(task))
+            _standard_input(process).write(task_line(task))
             _standard_input(process).flush()
         yield process
     finally:
@@ -117,18 +126,6 @@ def _process(task: Task, log_file: IO[bytes]) -> Iterator[subprocess.Popen[bytes
                     pipe.close()
 
 
-def _as_message(task: Task) -> bytes:
-    return line(
-        {
-            "entry": task.kind.entry,
-            "request": dict(task.request),
-            "inputs": {role: str(path) for role, path in task.inputs.items()},
-            "folder": str(task.folder),
-            "memory_limit_bytes": task.kind.memory_limit_bytes,
-        }
-    )
-
-
 def _standard_input(process: subprocess.Popen[bytes]) -> IO[bytes]:
     if process.stdin is None:
         raise InternalError("no-pipe", "a task has no standard input", "report this fault")
@@ -141,8 +138,8 @@ def _ask_to_stop(process: subprocess.Popen[bytes]) -> None:
         _standard_input(process).flush()
 
 
-def _messages(process: subprocess.Popen[bytes]) -> Iterator[dict[str, Any] | None]:
-    """Messages as they come, and None at least every :data:`_POLL_S`; ends with the process."""
+def _lines(process: subprocess.Popen[bytes]) -> Iterator[bytes | None]:
+    """Lines as they come, and None at least every :data:`_POLL_S`; ends with the process."""
     if process.stdout is None:
         raise InternalError("no-pipe", "a task has no standard output", "report this fault")
     pending, handle = b"", process.stdout.fileno()
@@ -156,7 +153,7 @@ def _messages(process: subprocess.Popen[bytes]) -> Iterator[dict[str, Any] | Non
         if not chunk:
             return
         *lines, pending = (pending + chunk).split(b"\n")
-        yield from (json.loads(text) for text in lines)
+        yield from lines
 
 
 def _log_output(log_file: IO[bytes]) -> None:

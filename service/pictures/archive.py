@@ -16,6 +16,7 @@ from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 
 from common.errors import InputError, TooLargeError
+from service.kinds.imports import PictureFacts
 from service.pictures.listing import LAYOUT, is_picture
 
 MOST_PICTURES = 20_000
@@ -27,11 +28,11 @@ KEPT_FREE = 1 << 30
 _BROKEN = (zipfile.BadZipFile, EOFError, zlib.error, lzma.LZMAError, NotImplementedError)
 """What reading a picture of a broken archive, or of one packed in an unknown way, may raise."""
 
-_NAME = re.compile(r"^[\w][\w .+-]{0,99}$")
+_NAME = re.compile(r"\w[\w .+-]{0,99}")
 
 
-def archive_facts(path: Path) -> dict[str, object]:
-    """What an archive holds: pictures by camera, frames, bytes when unpacked.
+def archive_facts(path: Path) -> PictureFacts:
+    """What an archive holds.
 
     Raises :class:`InputError` for anything but a ZIP archive with a folder per camera.
     """
@@ -40,11 +41,11 @@ def archive_facts(path: Path) -> dict[str, object]:
     cameras: dict[str, int] = {}
     for camera, _, _ in entries:
         cameras[camera] = cameras.get(camera, 0) + 1
-    return {
-        "cameras": cameras,
-        "frames": len({PurePosixPath(name).stem for _, name, _ in entries}),
-        "bytes": sum(info.file_size for _, _, info in entries),
-    }
+    return PictureFacts(
+        cameras=cameras,
+        frames=len({PurePosixPath(name).stem for _, name, _ in entries}),
+        bytes=sum(info.file_size for _, _, info in entries),
+    )
 
 
 def unpack(path: Path, folder: Path) -> None:
@@ -105,7 +106,7 @@ def _pictures(archive: zipfile.ZipFile, name: str) -> Iterator[tuple[str, str, z
             problem = f"{parts[-1][:80]!r} in {name} is of no camera"
             raise InputError("pictures-none", problem, LAYOUT)
         camera, file = parts[-2:]
-        if not (_NAME.match(camera) and _NAME.match(file)):
+        if not (_NAME.fullmatch(camera) and _NAME.fullmatch(file)):
             raise InputError(
                 "pictures-archive",
                 f"{name} holds a picture with the odd name {info.filename[:80]!r}",

@@ -15,6 +15,7 @@ from sqlalchemy import Connection, insert, select
 from sqlalchemy.exc import DatabaseError
 
 from common.errors import InputError, InternalError
+from service.ipc import error_fields
 from service.store import idempotency
 from service.store.blobs import Blobs, known_files
 from service.store.database import Database
@@ -23,7 +24,6 @@ from service.store.jobs import Jobs
 from service.store.lock import FolderLock
 from service.store.scans import Scans
 from service.store.tables import identity, utc_now
-from service.wire import error_fields
 
 DATABASE_NAME = "rigwright.sqlite3"
 _BEFORE_THE_DATABASE = {"lock", "lost+found"}

@@ -27,8 +27,16 @@ class IdempotencyKey:
     key: str
 
 
-def claim(connection: Connection, claimed: IdempotencyKey) -> dict[str, Any] | None:
-    """Claim a key. The stored row when it was answered before, else None.
+@dataclass(frozen=True)
+class StoredAnswer:
+    """What a key was answered with, and the hash of the request it was for."""
+
+    request_sha256: str | None
+    answer: Any
+
+
+def claim(connection: Connection, claimed: IdempotencyKey) -> StoredAnswer | None:
+    """Claim a key. What is stored when it was answered before, else None.
 
     Raises :class:`ConflictError` while another request with the key is being answered.
     """
@@ -44,18 +52,18 @@ def claim(connection: Connection, claimed: IdempotencyKey) -> dict[str, Any] | N
             "a request with this Idempotency-Key is still being answered",
             "wait for its answer, then ask again",
         )
-    return dict(row)
+    return StoredAnswer(row["request_sha256"], row["answer"])
 
 
-def replay(stored: dict[str, Any], request_sha256: str) -> Any:  # noqa: ANN401 - any JSON value
+def replay(stored: StoredAnswer, request_sha256: str) -> Any:  # noqa: ANN401 - any JSON value
     """The answer given before. Raises :class:`InputError` when the request was another one."""
-    if stored["request_sha256"] != request_sha256:
+    if stored.request_sha256 != request_sha256:
         raise InputError(
             "idempotency-key-reused",
             "this Idempotency-Key was used for a request with another content",
             "choose a new key for a new request",
         )
-    return stored["answer"]
+    return stored.answer
 
 
 def answer(

@@ -42,6 +42,11 @@ class JobEvent:
     data: JSON
     at: str
 
+    @property
+    def problem(self) -> dict[str, str] | None:
+        """The error that the event tells of, as fields."""
+        return self.data.get("problem")
+
 
 @dataclass(frozen=True)
 class FileRecord:

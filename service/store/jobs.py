@@ -156,6 +156,15 @@ class Jobs:
             lambda connection: [record_of(row) for row in connection.execute(query).mappings()]
         )
 
+    def completed_against(self, kind: str, reference: str, limit: int) -> list[JobRecord]:
+        """The completed jobs of a kind whose request names ``reference``, newest first."""
+        named = jobs.c.request["reference"].as_string() == reference
+        query = select(jobs).where(jobs.c.kind == kind, jobs.c.status == JobStatus.COMPLETED, named)
+        query = query.order_by(jobs.c.seq.desc()).limit(limit)
+        return self._database.read(
+            lambda connection: [record_of(row) for row in connection.execute(query).mappings()]
+        )
+
     def counts(self) -> dict[JobStatus, int]:
         """How many jobs are in each state."""
         query = select(jobs.c.status, func.count()).group_by(jobs.c.status)

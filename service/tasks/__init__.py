@@ -1,4 +1,6 @@
-"""The entries of tasks: what runs in a process of its own for the service or a command.
+"""What runs in a process of its own for the service or a command.
 
-Each is called as ``function(request, inputs, folder, report, cancel)`` and returns a JSON object.
+The one place, with :mod:`service.stations`, where the service has geometry, solver, rig and
+calibration work. Each task is called with a :class:`service.jobs.engine.Task` and what it needs
+while it runs, and returns its kind's result.
 """

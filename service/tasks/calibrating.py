@@ -1,14 +1,13 @@
-"""Calibrations, checks and acceptance tests, asked for over HTTP or on the command line.
+"""Calibrations, checks and acceptance tests.
 
 What all have: the target set as input ``targets``, the pictures as in
-:mod:`service.measuring.seeing`, ``workers`` and ``made_utc`` in the request.
+:mod:`service.tasks.seeing`, ``workers`` and ``made_utc`` in the task's run.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 from calibration.acceptance import LengthLimit, Volume, accept, certificate_pdf
 from calibration.acceptance.certificate import Heading
@@ -26,117 +25,111 @@ from calibration.files import (
 )
 from calibration.report import calibration_page, check_page, history_of, history_page
 from calibration.targets.files import read_targets
-from common.errors import InputError
-from common.progress import CancelToken, Progress, ProgressCallback
+from common.progress import Progress, ProgressCallback
 from rig.design.designfile import read_design
-from service.measuring.figures import acceptance_figures, calibration_figures, check_figures
-from service.measuring.seeing import DETECTING, see, seen_figures
-
-JSON = dict[str, Any]
-Request = Mapping[str, Any]
-Inputs = Mapping[str, Path]
+from service.jobs.engine import Running, Task
+from service.kinds.acceptance import AcceptanceRequest, AcceptanceResult
+from service.kinds.base import RunContext
+from service.kinds.calibration import CalibrationRequest, CalibrationResult
+from service.kinds.check import CheckOutcome, CheckRequest
+from service.tasks.measurement_results import acceptance_result, calibration_result, check_result
+from service.tasks.seeing import DETECTING, detection_of, see
+from service.tasks.stages import between
 
 
 def calibration(
-    request: Request, inputs: Inputs, folder: Path, report: ProgressCallback, cancel: CancelToken
-) -> JSON:
+    task: Task[CalibrationRequest, CalibrationResult], running: Running
+) -> CalibrationResult:
     """Calibrate all cameras; writes ``calibration.json``, ``report.html``, ``detections.json``."""
-    plan = read_targets(inputs["targets"])
-    seen = see(plan, request, inputs, folder, report, cancel)
-    options = _options(request, inputs)
-    done = calibrate(seen.observations, options, _after(report), cancel)
-    record = CalibrationRecord(request["name"], request["made_utc"], done)
-    write_calibration(folder / "calibration.json", record)
-    _write(folder / "report.html", calibration_page(record))
-    report(Progress("done", 1.0))
-    return {"detection": seen_figures(seen), **calibration_figures(done)}
+    plan = read_targets(task.inputs["targets"])
+    seen = see(plan, task, running)
+    options = _options(task.request, task.inputs)
+    done = calibrate(seen.observations, options, _after(running.report), running.cancel)
+    record = CalibrationRecord(task.request.name, task.run.made_utc, done)
+    write_calibration(task.folder / "calibration.json", record)
+    _write(task.folder / "report.html", calibration_page(record))
+    running.report(Progress("done", 1.0))
+    return calibration_result(done, detection_of(seen))
 
 
-def _options(request: Request, inputs: Inputs) -> CalibrationOptions:
+def _options(request: CalibrationRequest, inputs: Mapping[str, Path]) -> CalibrationOptions:
     start: tuple[CalibratedCamera, ...] = ()
     if "design" in inputs:
         start = tuple(map(CalibratedCamera.from_rig, read_design(inputs["design"]).cameras))
-    sigmas = request.get("poses_known_to")
-    hold, free = request.get("hold") or (), request.get("free") or ()
-    both = sorted(set(hold) & set(free))
-    if both:
-        raise InputError(
-            "calibration-model",
-            f"the lens parameter {both[0]} shall be held and free",
-            "name it in one of the two",
-        )
-    model = dict.fromkeys(hold, FIXED) | dict.fromkeys(free, FREE)
+    known = request.poses_known_to
+    model = {str(name): FIXED for name in request.hold}
+    model |= {str(name): FREE for name in request.free}
     return CalibrationOptions(
         start=start,
         model=InteriorModel(**model),
-        reference_poses=None if sigmas is None else ReferencePoses(*sigmas),
-        cross_validate=request.get("cross_validate", True),
+        reference_poses=None
+        if known is None
+        else ReferencePoses(known.position_sigma_mm, known.rotation_sigma_deg),
+        cross_validate=request.cross_validate,
     )
 
 
-def rig_check(
-    request: Request, inputs: Inputs, folder: Path, report: ProgressCallback, cancel: CancelToken
-) -> JSON:
-    """Check a rig against its calibration; writes ``check.json``, ``report.html``.
+def rig_check(task: Task[CheckRequest, CheckOutcome], running: Running) -> CheckOutcome:
+    """Compare a rig with its calibration; writes ``check.json`` and ``report.html``.
 
-    With earlier checks (inputs ``check-0``, ``check-1``...) there is a ``history.html`` as well.
+    With earlier checks as inputs ``check-1``, ``check-2`` ... writes ``history.html`` as well.
     """
-    told = read_calibration(inputs["calibration"])
-    reference, name = told.calibration, _name(request, inputs, told)
-    seen = see(read_targets(inputs["targets"]), request, inputs, folder, report, cancel)
-    given = {k: request.get(k) for k in ("hidden_limit_mm", "tolerance_mm")}
-    limits = {key: value for key, value in given.items() if value is not None}
-    result = check(reference, seen.observations, CheckOptions(**limits), _after(report), cancel)
-    record = CheckRecord(name, request["made_utc"], result)
-    CHECKS.write(folder / "check.json", record)
-    _write(folder / "report.html", check_page(record, reference))
-    earlier = [CHECKS.read(path) for role, path in inputs.items() if role.startswith("check-")]
+    told = read_calibration(task.inputs["calibration"])
+    reference, name = told.calibration, _name(task.run, task.inputs, told)
+    seen = see(read_targets(task.inputs["targets"]), task, running)
+    options = CheckOptions(
+        hidden_limit_mm=task.request.hidden_limit_mm, tolerance_mm=task.request.tolerance_mm
+    )
+    result = check(reference, seen.observations, options, _after(running.report), running.cancel)
+    record = CheckRecord(name, task.run.made_utc, result)
+    CHECKS.write(task.folder / "check.json", record)
+    _write(task.folder / "report.html", check_page(record, reference))
+    earlier = [CHECKS.read(path) for role, path in task.inputs.items() if role.startswith("check-")]
     if earlier:
         history = history_of([*earlier, record], name)
-        _write(folder / "history.html", history_page(history))
-    report(Progress("done", 1.0))
-    return {"detection": seen_figures(seen), **check_figures(result)}
+        _write(task.folder / "history.html", history_page(history))
+    running.report(Progress("done", 1.0))
+    return check_result(result, detection_of(seen))
 
 
 def acceptance(
-    request: Request, inputs: Inputs, folder: Path, report: ProgressCallback, cancel: CancelToken
-) -> JSON:
+    task: Task[AcceptanceRequest, AcceptanceResult], running: Running
+) -> AcceptanceResult:
     """Measure a calibrated bar along several lines; writes ``certificate.pdf``."""
-    told = read_calibration(inputs["calibration"])
-    reference, name = told.calibration, _name(request, inputs, told)
-    limit, volume = LengthLimit(*request["limit"]), Volume(*request["volume"])
-    seen = see(read_targets(inputs["targets"]), request, inputs, folder, report, cancel)
-    done = accept(reference, seen.observations, limit, volume, _after(report), cancel)
+    told = read_calibration(task.inputs["calibration"])
+    reference, name = told.calibration, _name(task.run, task.inputs, told)
+    request = task.request
+    limit = LengthLimit(request.limit.a_um, request.limit.k_um_per_m, request.limit.b_um)
+    asked = request.volume
+    volume = Volume(asked.width_mm, asked.height_mm, asked.depth_mm)
+    seen = see(read_targets(task.inputs["targets"]), task, running)
+    report, cancel = _after(running.report), running.cancel
+    done = accept(reference, seen.observations, limit, volume, report, cancel)
     heading = Heading(
-        rig=request["rig"],
+        rig=request.rig,
         calibration=name,
         artefact=seen.observations.targets.name,
-        operator=request["operator"],
-        made_utc=request["made_utc"],
-        temperature_degc=request["temperature_degc"],
+        operator=request.operator,
+        made_utc=task.run.made_utc,
+        temperature_degc=request.temperature_degc,
     )
-    (folder / "certificate.pdf").write_bytes(certificate_pdf(done, heading))
-    record = AcceptanceRecord(name, request["made_utc"], done)
-    ACCEPTANCES.write(folder / "acceptance.json", record)
-    report(Progress("done", 1.0))
-    return {"detection": seen_figures(seen), **acceptance_figures(done)}
+    (task.folder / "certificate.pdf").write_bytes(certificate_pdf(done, heading))
+    record = AcceptanceRecord(name, task.run.made_utc, done)
+    ACCEPTANCES.write(task.folder / "acceptance.json", record)
+    running.report(Progress("done", 1.0))
+    return acceptance_result(done, detection_of(seen))
 
 
-def _name(request: Request, inputs: Inputs, record: CalibrationRecord) -> str:
+def _name(run: RunContext, inputs: Mapping[str, Path], record: CalibrationRecord) -> str:
     """What a reference is called: its id, or its name and time, which tell it from others."""
-    known = request.get("reference")
-    if known:
-        return str(known)
+    if run.reference:
+        return run.reference
     return f"{record.name or inputs['calibration'].parent.name}, {record.made_utc}"
 
 
 def _after(report: ProgressCallback) -> ProgressCallback:
     """Progress of what follows detection."""
-
-    def within(inner: Progress, /) -> None:
-        report(Progress(inner.stage, DETECTING + (0.99 - DETECTING) * inner.fraction))
-
-    return within
+    return between(report, DETECTING, 0.99)
 
 
 def _write(path: Path, text: str) -> None:

@@ -1,120 +1,140 @@
-"""Designs and evaluations, asked for over HTTP or on the command line."""
+"""Designs and evaluations."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
-from common.progress import CancelToken, Progress, ProgressCallback
-from geometry.camera import RigCamera
+import trimesh
+
+from common.progress import Progress
 from geometry.head import synthetic_head
+from geometry.preparation import PreparedSubject, prepare_subject
+from geometry.reading import read_scan
+from geometry.scan import Scan
 from rig.acquisition.station.examples import example_station_text
-from rig.design.designfile import design_from_mapping, read_design
+from rig.design.designfile import design_from_mapping, evaluation_document
+from rig.design.layout import Layout, make_layout
+from rig.report.designfolder import write_design_folder
 from rig.specification.examples import example_text
-from rig.specification.rigfile import parse_rig, read_rig, rig_from_mapping
+from rig.specification.rigfile import parse_rig
 from rig.specification.spec import RigSpec
-from service import work
+from service.jobs.engine import Running, Task
+from service.kinds.design import Conflict, DemoRequest, DesignRequest, DesignResult
+from service.kinds.evaluation import Coverage, EvaluationRequest, EvaluationResult
+from service.tasks.reading import notes_of
+from service.tasks.stages import between
+from solver.design import design as solve
+from solver.quality import evaluate
+from solver.result import Design, Quality
 
-JSON = dict[str, Any]
-Request = Mapping[str, Any]
-Inputs = Mapping[str, Path]
-
-
-def design(
-    request: Request, inputs: Inputs, folder: Path, report: ProgressCallback, cancel: CancelToken
-) -> JSON:
-    """Design a rig given as JSON and write its files into ``folder``."""
-    spec = rig_from_mapping(request["rig"])
-    return _designed(request, inputs["scan"], spec, folder, report, cancel)
+_READING = 0.02
+_DESIGNING = 0.96
 
 
-def design_from_files(
-    request: Request, inputs: Inputs, folder: Path, report: ProgressCallback, cancel: CancelToken
-) -> JSON:
-    """Design a rig given as a file, with what the command line says instead of it."""
-    spec = _overridden(read_rig(inputs["rig"]), request)
-    return _designed(request, inputs["scan"], spec, folder, report, cancel)
+def design(task: Task[DesignRequest, DesignResult], running: Running) -> DesignResult:
+    """Design a rig for the input ``scan`` and write its files."""
+    spec = task.request.spec()
+    return _designed(
+        task.inputs["scan"], spec, task.folder, task.run.scan_name, task.run.workers, running
+    )
 
 
-def demo(
-    request: Request, inputs: Inputs, folder: Path, report: ProgressCallback, cancel: CancelToken
-) -> JSON:
+def demo(task: Task[DemoRequest, DesignResult], running: Running) -> DesignResult:
     """Design the example face rig for the bundled head; both are put beside the design."""
-    del inputs
-    report(Progress("making the head", 0.0))
-    scan = folder.with_name("head.ply")
-    work.write_scan(synthetic_head(), scan)
+    running.report(Progress("making the head", 0.0))
+    scan = task.folder.with_name("head.ply")
+    _write_scan(synthetic_head(), scan)
     rig = example_text("face")
-    spec = _overridden(parse_rig(rig, "face.toml"), request)
-    named = {**request, "scan_name": scan.name}
-    summary = _designed(named, scan, spec, folder, report, cancel)
-    scan.replace(folder / scan.name)
-    (folder / "face.toml").write_text(rig, encoding="utf-8")
-    (folder / "station.toml").write_text(example_station_text(), encoding="utf-8")
-    return summary
+    spec = parse_rig(rig, "face.toml")
+    result = _designed(scan, spec, task.folder, scan.name, task.run.workers, running)
+    scan.replace(task.folder / scan.name)
+    (task.folder / "face.toml").write_text(rig, encoding="utf-8")
+    (task.folder / "station.toml").write_text(example_station_text(), encoding="utf-8")
+    return result
 
 
 def evaluation(
-    request: Request, inputs: Inputs, folder: Path, report: ProgressCallback, cancel: CancelToken
-) -> JSON:
-    """Score cameras given as JSON and write ``evaluation.json`` into ``folder``."""
-    del cancel
-    spec = rig_from_mapping(request["rig"])
-    cameras = design_from_mapping(request["design"], "design", spec.camera).cameras
-    return _evaluated(inputs["scan"], spec, cameras, folder, report)
-
-
-def evaluation_from_files(
-    request: Request, inputs: Inputs, folder: Path, report: ProgressCallback, cancel: CancelToken
-) -> JSON:
-    """Score the cameras of a design file."""
-    del request, cancel
-    spec = read_rig(inputs["rig"])
-    cameras = read_design(inputs["design"], spec.camera).cameras
-    return _evaluated(inputs["scan"], spec, cameras, folder, report)
-
-
-def _overridden(spec: RigSpec, request: Request) -> RigSpec:
-    if request["cameras"] is not None:
-        spec = spec.with_count(request["cameras"])
-    if request["seed"] is not None:
-        spec = spec.with_seed(request["seed"])
-    if request["starts"] is not None:
-        spec = replace(spec, starts=request["starts"])
-    return spec
+    task: Task[EvaluationRequest, EvaluationResult], running: Running
+) -> EvaluationResult:
+    """Score given cameras on the input ``scan`` and write ``evaluation.json``."""
+    spec = task.request.rig.to_spec()
+    placed = task.request.design.model_dump(by_alias=True, exclude_unset=True)
+    cameras = design_from_mapping(placed, "design", spec.camera).cameras
+    running.report(Progress("reading the scan and scoring", 0.0))
+    scan = read_scan(task.inputs["scan"], spec.scan_options)
+    prepared = prepare_subject(scan, spec.subject_options)
+    quality = evaluate(prepared.subject, cameras, spec.limits)
+    document = json.dumps(evaluation_document(cameras, quality))
+    (task.folder / "evaluation.json").write_text(document, encoding="utf-8")
+    return _scored(quality, len(cameras), prepared)
 
 
 def _designed(
-    request: Request,
-    scan: Path,
-    spec: RigSpec,
-    folder: Path,
-    report: ProgressCallback,
-    cancel: CancelToken,
-) -> JSON:
-    outcome = work.run_design(
-        scan,
-        spec,
-        folder,
-        scan_name=request["scan_name"],
-        workers=request["workers"],
-        progress=report,
-        cancel=cancel,
+    scan: Path, spec: RigSpec, folder: Path, scan_name: str, workers: int, running: Running
+) -> DesignResult:
+    """Read, design, lay out, write."""
+    running.report(Progress("reading the scan", 0.0))
+    prepared = prepare_subject(read_scan(scan, spec.scan_options), spec.subject_options)
+    made = solve(
+        prepared.subject,
+        spec.camera,
+        spec.limits,
+        count=spec.count,
+        seed=spec.seed,
+        starts=spec.starts,
+        fixed=spec.fixed,
+        start=spec.start or None,
+        workers=workers,
+        progress=between(running.report, _READING, _DESIGNING),
+        cancel=running.cancel,
     )
-    return outcome.summary
+    running.report(Progress("writing the files", _DESIGNING))
+    layout = make_layout(made.cameras, prepared.subject, spec.limits)
+    write_design_folder(folder, made, layout, prepared, spec, scan_name)
+    running.report(Progress("done", 1.0))
+    return _result(made, layout, prepared, spec.name)
 
 
-def _evaluated(
-    scan: Path,
-    spec: RigSpec,
-    cameras: tuple[RigCamera, ...],
-    folder: Path,
-    report: ProgressCallback,
-) -> JSON:
-    report(Progress("reading the scan and scoring", 0.0))
-    summary, document = work.run_evaluation(scan, spec, cameras)
-    (folder / "evaluation.json").write_text(json.dumps(document), encoding="utf-8")
-    return summary
+def _write_scan(scan: Scan, path: Path) -> None:
+    """A scan as a mesh file, millimetres in the rig frame."""
+    trimesh.Trimesh(
+        scan.vertices_mm, scan.faces, vertex_normals=scan.normals, process=False
+    ).export(path)
+
+
+def _scored(quality: Quality, cameras: int, prepared: PreparedSubject) -> EvaluationResult:
+    """The figures of a network in short."""
+    return EvaluationResult(
+        feasible=bool(quality.feasible),
+        cameras=cameras,
+        cost_mm2=float(quality.cost_mm2),
+        sigma_median_mm=float(quality.sigma_median_mm),
+        sigma_p95_mm=float(quality.sigma_p95_mm),
+        sigma_max_mm=float(quality.sigma_max_mm),
+        coverage=[Coverage(views=row.views, share=float(row.share)) for row in quality.coverage],
+        in_focus_share=float(quality.in_focus_share),
+        in_frame_share=float(quality.in_frame_share),
+        violated=[row.name for row in quality.violated],
+        notes=notes_of(prepared.notes),
+    )
+
+
+def _result(made: Design, layout: Layout, prepared: PreparedSubject, name: str) -> DesignResult:
+    """A design in short."""
+    scored = _scored(made.quality, len(made.cameras), prepared)
+    conflicts = [
+        Conflict(family=c.family, unit=c.unit, give=c.amount, give_alone=c.amount_alone)
+        for c in made.solver.conflicts
+    ]
+    return DesignResult(
+        **dict(scored),
+        name=name,
+        seed=made.solver.seed,
+        status=str(made.solver.status),
+        why_stopped=made.solver.why_stopped,
+        start_cost_mm2=float(made.start_quality.cost_mm2),
+        conflicts=conflicts,
+        collisions=len(layout.collisions),
+        seconds=made.solver.seconds,
+    )

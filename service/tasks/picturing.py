@@ -2,21 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from pathlib import Path
-from typing import Any
-
-from common.progress import CancelToken, ProgressCallback
+from service.jobs.engine import Running, Task
+from service.kinds.imports import PictureFacts, PicturesImportRequest
 from service.pictures.archive import archive_facts
 
 
 def import_pictures(
-    request: Mapping[str, Any],
-    inputs: Mapping[str, Path],
-    folder: Path,
-    report: ProgressCallback,
-    cancel: CancelToken,
-) -> dict[str, Any]:
-    """Tell which pictures are in an archive."""
-    del request, folder, report, cancel
-    return archive_facts(inputs["upload"])
+    task: Task[PicturesImportRequest, PictureFacts], running: Running
+) -> PictureFacts:
+    """Tell which pictures are in the input ``upload``."""
+    del running
+    return archive_facts(task.inputs["upload"])

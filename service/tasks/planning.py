@@ -1,129 +1,153 @@
-"""Mount plans, asked for over HTTP or on the command line."""
+"""Mount plans."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from pathlib import Path
-from typing import Any
+from collections.abc import Iterable
 
 from common.errors import InputError
-from common.files.plain import plain
-from common.progress import CancelToken, Progress, ProgressCallback
+from common.progress import Progress
 from geometry.preparation import prepare_subject
 from geometry.reading import read_scan
 from rig.build.folder.planfiles import PlanOptions
 from rig.build.folder.planfolder import write_plan
 from rig.build.mounts.making import make_plan
-from rig.build.mounts.plan import MountPlan
-from rig.build.mounts.systemfile import read_system, system_from_mapping
+from rig.build.mounts.plan import Clash, Figures, MountPlan, Price, Tolerance
+from rig.build.mounts.settings import CameraMount
 from rig.build.parts import Prices, must_be_known
 from rig.catalogue import load_catalogue
 from rig.design.designfile import read_design
+from service.jobs.engine import Running, Task
+from service.kinds.plan import (
+    PlanCamera,
+    PlanClash,
+    PlanNetwork,
+    PlanPrice,
+    PlanRequest,
+    PlanResult,
+    PlanSetting,
+    PlanTolerance,
+)
+from service.tasks.stages import between
 
-JSON = dict[str, Any]
-Request = Mapping[str, Any]
-Inputs = Mapping[str, Path]
 _PLANNING, _WRITING = 0.05, 0.75
 
 
-def plan(
-    request: Request, inputs: Inputs, folder: Path, report: ProgressCallback, cancel: CancelToken
-) -> JSON:
-    """Plan a mount for a design and write all that a builder needs into ``folder``.
-
-    Inputs ``design`` and ``scan``, and ``mount`` unless the request has it as JSON.
-    """
-    report(Progress("reading the design and the scan", 0.0))
-    catalogue = load_catalogue()
-    if "mount" in inputs:
-        system = read_system(inputs["mount"], catalogue)
-    else:
-        system = system_from_mapping(request["mount"], "mount", catalogue)
-    read = read_design(inputs["design"])
+def plan(task: Task[PlanRequest, PlanResult], running: Running) -> PlanResult:
+    """Plan a mount for the inputs ``design`` and ``scan``; writes all that a builder needs."""
+    running.report(Progress("reading the design and the scan", 0.0))
+    request, catalogue = task.request, load_catalogue()
+    system = request.mount.checked(catalogue)
+    read = read_design(task.inputs["design"])
     if read.file.rig is None:
         raise InputError(
             "design-without-rig",
-            f"{inputs['design'].name} does not say its limits",
+            f"{task.inputs['design'].name} does not say its limits",
             "give a design.json that `rigwright design` wrote",
         )
     prices = Prices(system.currency, system.prices)
     must_be_known(prices, read.cameras, catalogue)
     rig = read.file.rig.to_spec()
-    scan = read_scan(inputs["scan"], rig.scan_options)
+    scan = read_scan(task.inputs["scan"], rig.scan_options)
     subject = prepare_subject(scan, rig.subject_options).subject
     made = make_plan(
         read.cameras,
         subject,
         rig.limits,
         system,
-        name=request["name"] or read.name,
-        seed=request["seed"],
-        progress=_between(report, _PLANNING, _WRITING),
-        cancel=cancel,
+        name=request.name or read.name,
+        seed=request.seed,
+        progress=between(running.report, _PLANNING, _WRITING),
+        cancel=running.cancel,
     )
     options = PlanOptions(
         catalogue=catalogue,
         prices=prices,
         occluder=subject.occluder,
-        paper=request["paper"],
-        step=request["step"],
+        paper=request.paper,
+        step=request.step,
     )
-    write_plan(made, folder, options, progress=_between(report, _WRITING, 1.0), cancel=cancel)
-    return plan_figures(made)
+    writing = between(running.report, _WRITING, 1.0)
+    write_plan(made, task.folder, options, progress=writing, cancel=running.cancel)
+    return _result(made)
 
 
-def _between(report: ProgressCallback, first: float, last: float) -> ProgressCallback:
-    def within(inner: Progress, /) -> None:
-        report(Progress(inner.stage, first + (last - first) * inner.fraction))
-
-    return within
-
-
-def plan_figures(made: MountPlan) -> JSON:
+def _result(made: MountPlan) -> PlanResult:
     """A plan in short."""
     structure = made.structure
-    figures: JSON = plain(
-        {
-            "name": made.name,
-            "system": made.system,
-            "buildable": not made.clashes,
-            "clashes": [vars(clash) for clash in made.clashes],
-            "price": {
-                "designed": made.price.designed,
-                "rounded": made.price.rounded,
-                "built": made.price.built,
-                "sigma_loss": made.price.sigma_loss,
-                "coverage_loss": made.price.coverage_loss,
-            },
-            "yield_share": made.yield_share,
-            "yield_trials": made.yield_trials,
-            "tightest": [vars(row) for row in _tightest(made)],
-            "members": len(structure.members),
-            "member_length_mm": sum(member.length_mm for member in structure.members),
-            "plates": len(structure.plates),
-            "wedges": len(structure.wedges),
-            "parts": len(structure.parts),
-            "cameras": [
-                {
-                    "name": mount.name,
-                    "settings": [
-                        {"name": s.name, "value": s.value, "unit": s.unit, "step": s.step}
-                        for s in mount.settings
-                    ],
-                }
-                for mount in made.mounts
-            ],
-            "steps": made.steps,
-            "notes": made.notes,
-        }
+    return PlanResult(
+        name=made.name,
+        system=made.system,
+        buildable=not made.clashes,
+        clashes=[_clash(clash) for clash in made.clashes],
+        price=_price(made.price),
+        yield_share=made.yield_share,
+        yield_trials=made.yield_trials,
+        tightest=[_tolerance(row) for row in _tightest(made.tolerances)],
+        members=len(structure.members),
+        member_length_mm=float(sum(member.length_mm for member in structure.members)),
+        plates=len(structure.plates),
+        wedges=len(structure.wedges),
+        parts=len(structure.parts),
+        cameras=[_camera(mount) for mount in made.mounts],
+        steps=list(made.steps),
+        notes=list(made.notes),
     )
-    return figures
 
 
-def _tightest(made: MountPlan) -> list[Any]:
+def _camera(mount: CameraMount) -> PlanCamera:
+    settings = [
+        PlanSetting(name=s.name, value=float(s.value), unit=s.unit, step=float(s.step))
+        for s in mount.settings
+    ]
+    return PlanCamera(name=mount.name, settings=settings)
+
+
+def _price(price: Price) -> PlanPrice:
+    return PlanPrice(
+        designed=_network(price.designed),
+        rounded=_network(price.rounded),
+        built=_network(price.built),
+        sigma_loss=float(price.sigma_loss),
+        coverage_loss=float(price.coverage_loss),
+    )
+
+
+def _network(figures: Figures) -> PlanNetwork:
+    return PlanNetwork(
+        sigma_median_mm=float(figures.sigma_median_mm),
+        sigma_p95_mm=float(figures.sigma_p95_mm),
+        coverage_2_views=float(figures.coverage_2_views),
+        coverage_3_views=float(figures.coverage_3_views),
+        feasible=bool(figures.feasible),
+        broken=list(figures.broken),
+    )
+
+
+def _clash(clash: Clash) -> PlanClash:
+    return PlanClash(
+        kind=clash.kind,
+        one=clash.one,
+        other=clash.other,
+        clearance_mm=float(clash.clearance_mm),
+        required_mm=float(clash.required_mm),
+    )
+
+
+def _tolerance(row: Tolerance) -> PlanTolerance:
+    return PlanTolerance(
+        camera=row.camera,
+        setting=row.setting,
+        unit=row.unit,
+        plus=float(row.plus),
+        minus=float(row.minus),
+        limit=row.limit,
+    )
+
+
+def _tightest(tolerances: Iterable[Tolerance]) -> list[Tolerance]:
     """Of each kind of setting the one that may be least off."""
-    rows: dict[tuple[str, str], Any] = {}
-    for row in made.tolerances:
+    rows: dict[tuple[str, str], Tolerance] = {}
+    for row in tolerances:
         key = row.setting, row.unit
         if key not in rows or min(row.plus, row.minus) < min(rows[key].plus, rows[key].minus):
             rows[key] = row

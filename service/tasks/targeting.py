@@ -1,44 +1,38 @@
-"""Target sets for the command line: printed, or proposed for a rig and printed."""
+"""Target sets: printed, or proposed for a rig and printed."""
 
 from __future__ import annotations
-
-from collections.abc import Mapping
-from pathlib import Path
-from typing import Any
 
 from calibration.targets.files import read_targets, write_targets
 from calibration.targets.kinds import CharucoPlate, MarkerCarrier, RingCarrier, TargetPlan
 from common.errors import CancelledError
-from common.progress import CancelToken, Progress, ProgressCallback
-from service.measuring.proposing import proposal_figures, proposal_for
-from service.measuring.sheets import sheets_of
+from common.progress import Progress
+from service.jobs.engine import Running, Task
+from service.kinds.targets import CarrierLine, SeenByCamera, TargetsRequest, TargetsResult
+from service.tasks.proposing import proposal_for, seen_by_cameras
+from service.tasks.sheets import sheets_of
 
-JSON = dict[str, Any]
 
+def targets(task: Task[TargetsRequest, TargetsResult], running: Running) -> TargetsResult:
+    """Write ``targets.toml`` and every sheet of a set.
 
-def targets(
-    request: Mapping[str, Any],
-    inputs: Mapping[str, Path],
-    folder: Path,
-    report: ProgressCallback,
-    cancel: CancelToken,
-) -> JSON:
-    """Write ``targets.toml`` and every sheet of the set given, or of one for the design given."""
-    proposed: JSON = {"cameras": [], "notes": []}
-    if "design" in inputs:
-        proposal = proposal_for(inputs["design"])
-        plan, proposed = proposal.plan, proposal_figures(proposal)
+    That is the input ``targets``, or one for the input ``design``.
+    """
+    cameras: list[SeenByCamera] = []
+    notes: list[str] = []
+    if "design" in task.inputs:
+        proposal = proposal_for(task.inputs["design"])
+        plan, cameras, notes = proposal.plan, seen_by_cameras(proposal), list(proposal.notes)
     else:
-        plan = read_targets(inputs["targets"])
-    write_targets(plan, folder / "targets.toml")
-    sheets = sheets_of(plan, request["page"])
+        plan = read_targets(task.inputs["targets"])
+    write_targets(plan, task.folder / "targets.toml")
+    sheets = sheets_of(plan, task.request.page)
     for number, sheet in enumerate(sheets.values()):
-        if cancel.is_set():
+        if running.cancel.is_set():
             raise CancelledError
-        report(Progress(f"drawing {sheet.name}", number / len(sheets)))
-        (folder / sheet.name).write_bytes(sheet.make())
-    report(Progress("done", 1.0))
-    return {"name": plan.name, "carriers": _carriers(plan), **proposed}
+        running.report(Progress(f"drawing {sheet.name}", number / len(sheets)))
+        (task.folder / sheet.name).write_bytes(sheet.make())
+    running.report(Progress("done", 1.0))
+    return TargetsResult(name=plan.name, carriers=_carriers(plan), cameras=cameras, notes=notes)
 
 
 _KINDS = {
@@ -48,5 +42,7 @@ _KINDS = {
 }
 
 
-def _carriers(plan: TargetPlan) -> list[JSON]:
-    return [{"name": c.name, "kind": _KINDS[type(c)], "targets": len(c.ids)} for c in plan.carriers]
+def _carriers(plan: TargetPlan) -> list[CarrierLine]:
+    return [
+        CarrierLine(name=c.name, kind=_KINDS[type(c)], targets=len(c.ids)) for c in plan.carriers
+    ]

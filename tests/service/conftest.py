@@ -18,7 +18,8 @@ import live_server  # noqa: E402
 from service_helpers import ROOT, LiveServer, StartServer  # noqa: E402
 
 from service.api.context import Service  # noqa: E402
-from service.kinds import KINDS  # noqa: E402
+from service.jobs.process import ProcessEngine  # noqa: E402
+from service.kinds.queued import QUEUED  # noqa: E402
 from service.settings import read_settings  # noqa: E402
 from service.store import Store  # noqa: E402
 
@@ -92,7 +93,8 @@ def service(tmp_path: Path) -> Iterator[Service]:
     settings = read_settings(
         data_dir=tmp_path / "data", max_upload_bytes=2 << 20, workers_per_job=1
     )
-    opened = Service(settings, {**KINDS, **counting_job.KINDS})
+    engine = ProcessEngine(settings.cancel_grace_s, "counting_job")
+    opened = Service(settings, {**QUEUED, **counting_job.KINDS}, engine)
     yield opened
     opened.close()
 

@@ -1,4 +1,7 @@
-"""Small real jobs for tests: they run in processes like any other, but need no solver."""
+"""Small real jobs for tests: they run in processes like any other, but need no solver.
+
+``python -m counting_job`` is the program of their processes.
+"""
 
 from __future__ import annotations
 
@@ -9,57 +12,62 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Mapping
-from pathlib import Path
-from typing import Any
 
 from common.errors import CancelledError, InputError
-from common.progress import CancelToken, Progress
-from service.jobs.engine import JobKind
-
-COUNT = JobKind("count", "counting_job:count")
-KINDS = {
-    kind.name: kind
-    for kind in (
-        COUNT,
-        JobKind("count-briefly", "counting_job:count", time_limit_s=0.5),
-        JobKind("misbehave", "counting_job:misbehave", memory_limit_bytes=2 << 30),
-    )
-}
-Report = Callable[[Progress], None]
+from common.progress import Progress
+from service.jobs.child import main
+from service.jobs.engine import Running, Task, Work
+from service.kinds.base import JobKind, Request, Result
+from service.tasks.registry import work_of
 
 
-def count(
-    request: Mapping[str, Any],
-    inputs: Mapping[str, Path],
-    folder: Path,
-    report: Report,
-    cancel: CancelToken,
-) -> dict[str, Any]:
+class CountRequest(Request):
+    to: int
+    step_s: float = 0.01
+    deaf: bool = False
+
+
+class Counted(Result):
+    counted: int
+    read: dict[str, str]
+
+
+class MisbehaveRequest(Request):
+    how: str
+    mark: str = ""
+
+
+class Misbehaved(Result):
+    how: str = ""
+    eaten: int = 0
+    threads: tuple[int, ...] = ()
+
+
+COUNT = JobKind("count", CountRequest, Counted)
+BRIEFLY = JobKind("count-briefly", CountRequest, Counted, time_limit_s=0.5)
+MISBEHAVE = JobKind("misbehave", MisbehaveRequest, Misbehaved, memory_limit_bytes=2 << 30)
+KINDS = {"count": COUNT, "count-briefly": BRIEFLY, "misbehave": MISBEHAVE}
+
+
+def count(task: Task[CountRequest, Counted], running: Running) -> Counted:
     """Counts to ``to``, a step each ``step_s``; writes what it counted."""
-    to, step_s = int(request["to"]), float(request.get("step_s", 0.01))
+    to = task.request.to
     if to < 0:
         raise InputError("value", f"cannot count to {to}", "give zero or more")
     for n in range(to):
-        if cancel.is_set() and not request.get("deaf"):
+        if running.cancel.is_set() and not task.request.deaf:
             raise CancelledError
-        report(Progress("counting", n / to, start=n, iteration=n, cost=float("nan")))
-        time.sleep(step_s)
-    (folder / "numbers.txt").write_text("\n".join(map(str, range(to))))
-    read = {role: path.suffix + ":" + str(path.stat().st_size) for role, path in inputs.items()}
-    return {"counted": to, "read": read}
+        running.report(Progress("counting", n / to, start=n, iteration=n, cost=float("nan")))
+        time.sleep(task.request.step_s)
+    (task.folder / "numbers.txt").write_text("\n".join(map(str, range(to))))
+    read = {r: path.suffix + ":" + str(path.stat().st_size) for r, path in task.inputs.items()}
+    return Counted(counted=to, read=read)
 
 
-def misbehave(
-    request: Mapping[str, Any],
-    inputs: Mapping[str, Path],
-    folder: Path,
-    report: Report,
-    cancel: CancelToken,
-) -> dict[str, Any]:
+def misbehave(task: Task[MisbehaveRequest, Misbehaved], running: Running) -> Misbehaved:
     """Fails in the way it is asked to."""
-    del inputs, folder, report, cancel
-    how = request["how"]
+    del running
+    how = task.request.how
     if how == "refuse":
         raise InputError("value", "seven is not a number of cameras", "give another")
     if how == "raise":
@@ -71,17 +79,27 @@ def misbehave(
     if how == "die":
         os.kill(os.getpid(), signal.SIGKILL)
     if how == "eat":
-        return {"eaten": len(bytearray(8 << 30))}
+        return Misbehaved(eaten=len(bytearray(8 << 30)))
     if how == "print":
         print("a banner", flush=True)  # noqa: T201 - as some libraries do
         subprocess.run(["echo", "another"], check=True)
     if how == "spawn":
         subprocess.Popen(
-            [sys.executable, "-c", f"import time; time.sleep(600) # {request['mark']}"]
+            [sys.executable, "-c", f"import time; time.sleep(600) # {task.request.mark}"]
         )
     if how == "threads":
         import numpy  # noqa: F401
         from threadpoolctl import threadpool_info
 
-        return {"threads": [pool["num_threads"] for pool in threadpool_info()]}
-    return {"how": how}
+        return Misbehaved(threads=tuple(pool["num_threads"] for pool in threadpool_info()))
+    return Misbehaved(how=how)
+
+
+def find(kind: str) -> Work:  # type: ignore[type-arg]
+    if kind == "misbehave":
+        return Work(MISBEHAVE, misbehave)
+    return Work(KINDS[kind], count) if kind in KINDS else work_of(kind)  # type: ignore[arg-type]
+
+
+if __name__ == "__main__":
+    sys.exit(main(find))

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Any
 
 import counting_job
+from counting_job import COUNT, Counted, CountRequest
 from fastapi import APIRouter, FastAPI, Response
 
 from service.api.app import create_app
 from service.api.context import Service, ServiceDep
 from service.api.job_routes import JobResource
-from service.api.models import IdempotencyKeyHeader, Job, Model
-from service.kinds import KINDS
+from service.api.models import IdempotencyKeyHeader, Job
+from service.jobs.process import ProcessEngine
+from service.kinds.base import Model
+from service.kinds.queued import QUEUED
 from service.logs import set_up_logging
 from service.server import serve
 from service.settings import read_settings
@@ -21,13 +23,7 @@ from service.store.idempotency import IdempotencyKey
 from service.store.jobrecords import NewJob
 
 
-class CountRequest(Model):
-    to: int
-    step_s: float = 0.01
-    deaf: bool = False
-
-
-class CountJob(Job[dict[str, Any]]):
+class CountJob(Job[Counted]):
     pass
 
 
@@ -37,13 +33,13 @@ class CountPage(Model):
 
 
 router = APIRouter()
-resource = JobResource("count", "counts", CountJob, CountPage)
+resource = JobResource(COUNT, "counts", CountJob, CountPage)
 
 
 @router.post("/v1/counts", status_code=201, response_model=CountJob)
 def add_count(
     request: CountRequest, response: Response, service: ServiceDep, key: IdempotencyKeyHeader = None
-) -> dict[str, Any]:
+) -> Job[Counted]:
     record = service.store.jobs.create(
         NewJob("count", request.model_dump()),
         max_pending=service.settings.max_queued_jobs,
@@ -51,9 +47,8 @@ def add_count(
         request_sha256=request.model_dump_json(),
     )
     service.jobs.wake()
-    document = resource.document(record)
-    response.headers["Location"] = document["links"]["self"]
-    return document
+    response.headers["Location"] = resource.location(record)
+    return resource.document(record)
 
 
 resource.add_to(router)
@@ -73,7 +68,8 @@ def say(url: str) -> None:
 def main() -> None:
     set_up_logging()
     settings = read_settings(port=0, data_dir=Path(sys.argv[1]))
-    service = Service(settings, {**KINDS, **counting_job.KINDS})
+    engine = ProcessEngine(settings.cancel_grace_s, "counting_job")
+    service = Service(settings, {**QUEUED, **counting_job.KINDS}, engine)
     serve(service, make(service), say)
     service.close()
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
-import json
 import os
 import signal
 import subprocess
@@ -12,19 +10,21 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import httpx2
 import pytest
 from typer.testing import CliRunner
 
-from common.files.plain import plain
-from common.progress import CancelToken, Progress
+from common.progress import CancelToken, ProgressCallback
 from rig.specification.examples import example_text
 from service.cli import app, running
-from service.jobs.engine import Report, Task
+from service.ipc import TaskMessage, message_from_line, outcome_line, task_line
+from service.jobs.engine import Running, Task
+from service.kinds.base import RequestT, ResultT
 from service.store import Store
 from service.store.jobrecords import JobRecord
+from service.tasks.registry import work_of
 
 T = TypeVar("T")
 HERE = Path(__file__).parent
@@ -104,17 +104,14 @@ def one_line_and_nothing_left(folder: Path, *arguments: object, here: bool = Fal
 class InThisProcess:
     """An engine that begins no process: for many tasks that fail early. Faults are seen whole."""
 
-    def run(self, task: Task, report: Report, cancel: CancelToken) -> dict[str, Any]:
-        module, _, name = task.kind.entry.partition(":")
-        entry = getattr(importlib.import_module(module), name)
-
-        def told(progress: Progress, /) -> None:
-            report(plain(progress))
-
-        request = json.loads(json.dumps(task.request))
-        result = entry(request, task.inputs, task.folder, told, cancel)
-        whole: dict[str, Any] = json.loads(json.dumps(plain(result), allow_nan=False))
-        return whole
+    def run(
+        self, task: Task[RequestT, ResultT], report: ProgressCallback, cancel: CancelToken
+    ) -> ResultT:
+        there = TaskMessage(task_line(task)).task(task.kind)
+        result = work_of(task.kind.name).function(there, Running(report, cancel))
+        back = message_from_line(outcome_line(result), task.kind)
+        assert isinstance(back, task.kind.result)
+        return back
 
 
 @dataclass

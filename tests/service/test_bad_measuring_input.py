@@ -30,7 +30,7 @@ from rig.acquisition.session.folder import Session, SessionPlan
 from rig.design.designfile import placed_camera
 from service.api.app import create_app
 from service.api.context import Service
-from service.kinds import KINDS
+from service.kinds.queued import QUEUED
 from service.settings import read_settings
 
 JSON = dict[str, Any]
@@ -176,7 +176,7 @@ def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
     settings = read_settings(
         data_dir=folder / "data", sessions_dir=folder / "sessions", workers_per_job=1
     )
-    opened = Service(settings, KINDS, InThisProcess())
+    opened = Service(settings, QUEUED, InThisProcess())
     yield opened
     opened.close()
 

@@ -32,7 +32,7 @@ from rig.specification.examples import example_text
 from service import work
 from service.api.app import create_app
 from service.api.context import Service
-from service.kinds import KINDS
+from service.kinds.queued import QUEUED
 from service.settings import read_settings
 
 JSON = dict[str, Any]
@@ -172,7 +172,7 @@ def test_a_plan_that_cannot_be_from_the_shell(folder: Path) -> None:
 def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
     folder = tmp_path_factory.mktemp("service")
     opened = Service(
-        read_settings(data_dir=folder / "data", workers_per_job=1), KINDS, InThisProcess()
+        read_settings(data_dir=folder / "data", workers_per_job=1), QUEUED, InThisProcess()
     )
     yield opened
     opened.close()

@@ -17,7 +17,7 @@ from starlette.testclient import TestClient
 
 from service.api.app import create_app
 from service.api.context import Service
-from service.kinds import KINDS
+from service.kinds.queued import QUEUED
 from service.settings import read_settings
 
 JSON = dict[str, Any]
@@ -34,7 +34,7 @@ pytestmark = pytest.mark.slow
 
 @contextmanager
 def serving(data: Path, *stations: Path) -> Iterator[TestClient]:
-    service = Service(read_settings(data_dir=data, stations=list(stations)), KINDS)
+    service = Service(read_settings(data_dir=data, stations=list(stations)), QUEUED)
     with TestClient(create_app(service)) as client:
         yield client
     service.close()

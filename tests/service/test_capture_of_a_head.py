@@ -22,7 +22,7 @@ from geometry.reading import read_scan
 from rig.design.designfile import placed_camera
 from service.api.app import create_app
 from service.api.context import Service
-from service.kinds import KINDS
+from service.kinds.queued import QUEUED
 from service.settings import read_settings
 
 JSON = dict[str, Any]
@@ -80,7 +80,7 @@ def test_seven_cameras_photograph_a_head(tmp_path: Path, kind: str) -> None:
     assert HEAD is not None
     with any_box(kind, tmp_path) as box:
         station = station_for(tmp_path, HEAD, box.url)
-        service = Service(read_settings(data_dir=tmp_path / "data", stations=[station]), KINDS)
+        service = Service(read_settings(data_dir=tmp_path / "data", stations=[station]), QUEUED)
         with TestClient(create_app(service)) as client:
             wait_for(lambda: client.get("/v1/rigs/studio").json()["status"] == "ready")
             asked = client.post(

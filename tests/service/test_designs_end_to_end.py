@@ -32,7 +32,7 @@ from rig.report.designfolder import FILE_NAMES
 from service import work
 from service.api.app import create_app
 from service.api.context import Service
-from service.kinds import KINDS
+from service.kinds.queued import QUEUED
 from service.settings import read_settings
 
 JSON = dict[str, Any]
@@ -54,7 +54,7 @@ def small_rig() -> JSON:
 @pytest.fixture(scope="module")
 def http(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
     settings = read_settings(data_dir=tmp_path_factory.mktemp("data"), workers_per_job=1)
-    service = Service(settings, KINDS)
+    service = Service(settings, QUEUED)
     with TestClient(create_app(service), raise_server_exceptions=False) as client:
         yield client
     service.close()

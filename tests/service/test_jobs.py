@@ -1,57 +1,61 @@
 from __future__ import annotations
 
+import math
 import subprocess
 import sys
 import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import counting_job
 import pytest
+from counting_job import BRIEFLY, COUNT, MISBEHAVE, CountRequest, Misbehaved, MisbehaveRequest
 from service_helpers import HERE, ROOT, alive, ended, files_under, wait_for
 
 from common.errors import CancelledError, ConflictError, InputError, InternalError, TooLargeError
-from common.progress import CancelToken, NeverCancelled
-from service.jobs.bell import Bell
+from common.progress import NeverCancelled, Progress, ignore_progress
 from service.jobs.cancels import Cancels
 from service.jobs.engine import Task
 from service.jobs.manager import JobManager
+from service.jobs.notifier import Notifier
 from service.jobs.process import ProcessEngine
+from service.kinds.base import JobKind, RequestT, ResultT
 from service.store import Store
 from service.store.jobrecords import NewJob
 from service.store.tables import JobStatus
 
-ENGINE = ProcessEngine(cancel_grace_s=0.5)
+PROGRAM = "counting_job"
+ENGINE = ProcessEngine(cancel_grace_s=0.5, program=PROGRAM)
 
 
-def run(
-    tmp_path: Path, kind: str, request: dict[str, Any], cancel: CancelToken | None = None
-) -> dict[str, Any]:
+def run(tmp_path: Path, kind: JobKind[RequestT, ResultT], request: RequestT) -> ResultT:
     folder = tmp_path / "files"
     folder.mkdir(exist_ok=True)
-    task = Task(counting_job.KINDS[kind], request, folder)
-    return ENGINE.run(task, lambda _: None, cancel or NeverCancelled())
+    return ENGINE.run(Task(kind, request, folder), ignore_progress, NeverCancelled())
+
+
+def misbehave(tmp_path: Path, how: str, mark: str = "") -> Misbehaved:
+    return run(tmp_path, MISBEHAVE, MisbehaveRequest(how=how, mark=mark))
 
 
 class TestProcessEngine:
     def test_it_gives_the_result_and_reports_progress(self, tmp_path: Path) -> None:
-        heard: list[dict[str, Any]] = []
-        task = Task(counting_job.COUNT, {"to": 5}, tmp_path)
-        assert ENGINE.run(task, heard.append, NeverCancelled())["counted"] == 5
-        assert [progress["start"] for progress in heard] == [0, 1, 2, 3, 4]
-        assert heard[0]["cost"] is None  # NaN has no form in JSON
+        heard: list[Progress] = []
+        task = Task(COUNT, CountRequest(to=5), tmp_path)
+        assert ENGINE.run(task, heard.append, NeverCancelled()).counted == 5
+        assert [progress.start for progress in heard] == [0, 1, 2, 3, 4]
+        assert math.isnan(heard[0].cost)  # NaN has no form in JSON, and comes back
         assert (tmp_path / "numbers.txt").read_text().split() == ["0", "1", "2", "3", "4"]
 
     def test_numerical_libraries_get_one_thread(self, tmp_path: Path) -> None:
-        threads = run(tmp_path, "misbehave", {"how": "threads"})["threads"]
+        threads = misbehave(tmp_path, "threads").threads
         assert threads
         assert set(threads) == {1}
 
     def test_errors_cross_whole(self, tmp_path: Path) -> None:
         with pytest.raises(InputError) as caught:
-            run(tmp_path, "misbehave", {"how": "refuse"})
+            misbehave(tmp_path, "refuse")
         assert str(caught.value) == "seven is not a number of cameras; give another"
         assert caught.value.detail == "value"
 
@@ -66,23 +70,23 @@ class TestProcessEngine:
     )
     def test_a_crash_is_an_internal_error(self, tmp_path: Path, how: str, detail: str) -> None:
         with pytest.raises(InternalError) as caught:
-            run(tmp_path, "misbehave", {"how": how})
+            misbehave(tmp_path, how)
         assert caught.value.detail == detail
 
     def test_memory_is_limited(self, tmp_path: Path) -> None:
         with pytest.raises(TooLargeError) as caught:
-            run(tmp_path, "misbehave", {"how": "eat"})
+            misbehave(tmp_path, "eat")
         assert caught.value.code == "too-large/memory"
 
     def test_time_is_limited(self, tmp_path: Path) -> None:
         began = time.monotonic()
         with pytest.raises(TooLargeError) as caught:
-            run(tmp_path, "count-briefly", {"to": 1000})
+            run(tmp_path, BRIEFLY, CountRequest(to=1000))
         assert caught.value.code == "too-large/time"
         assert time.monotonic() - began < 3.0
 
     def test_what_libraries_print_does_no_harm(self, tmp_path: Path) -> None:
-        assert run(tmp_path, "misbehave", {"how": "print"}) == {"how": "print"}
+        assert misbehave(tmp_path, "print").how == "print"
         assert files_under(tmp_path) == []
 
     @pytest.mark.parametrize("deaf", [False, True])
@@ -97,7 +101,7 @@ class TestProcessEngine:
 
         thread = threading.Thread(target=ask)
         thread.start()
-        task = Task(counting_job.COUNT, {"to": 10_000, "deaf": deaf}, tmp_path)
+        task = Task(COUNT, CountRequest(to=10_000, deaf=deaf), tmp_path)
         with pytest.raises(CancelledError):
             ENGINE.run(task, lambda _: began.set(), cancel)
         thread.join()
@@ -105,7 +109,7 @@ class TestProcessEngine:
 
     def test_processes_that_the_work_started_end_with_it(self, tmp_path: Path) -> None:
         mark = f"left-behind-{tmp_path.name}"
-        run(tmp_path, "misbehave", {"how": "spawn", "mark": mark})
+        misbehave(tmp_path, "spawn", mark)
         wait_for(lambda: not alive(mark), 5.0)
 
     def test_nothing_outlives_the_process_that_started_it(self, tmp_path: Path) -> None:
@@ -116,10 +120,11 @@ class TestProcessEngine:
             "from pathlib import Path\n"
             "from service.jobs.engine import Task\n"
             "from service.jobs.process import ProcessEngine\n"
-            "from common.progress import CancelToken, NeverCancelled\n"
-            f"task = Task(counting_job.COUNT, {{'to': 100000, 'mark': 1}}, "
-            f"Path({str(tmp_path / mark)!r}))\n"
-            "ProcessEngine().run(task, lambda p: print(p['start'], flush=True), NeverCancelled())\n"
+            "from common.progress import NeverCancelled, Progress, ignore_progress\n"
+            "request = counting_job.CountRequest(to=100000)\n"
+            f"task = Task(counting_job.COUNT, request, Path({str(tmp_path / mark)!r}))\n"
+            "engine = ProcessEngine(program='counting_job')\n"
+            "engine.run(task, lambda p: print(p.start, flush=True), NeverCancelled())\n"
         )
         (tmp_path / mark).mkdir()
         parent = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True)
@@ -134,12 +139,12 @@ class TestProcessEngine:
 
 
 def manager_of(store: Store, cancels: Cancels, at_once: int) -> JobManager:
-    return JobManager(store, ENGINE, counting_job.KINDS, Bell(), cancels, at_once)
+    return JobManager(store, ENGINE, counting_job.KINDS, Notifier(), cancels, at_once)
 
 
 @pytest.fixture
 def cancels(store: Store) -> Cancels:
-    return Cancels(store, Bell())
+    return Cancels(store, Notifier())
 
 
 @pytest.fixture

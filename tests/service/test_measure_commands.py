@@ -23,7 +23,7 @@ from geometry.arrays import Floats
 from rig.design.designfile import placed_camera
 from service.api.app import create_app
 from service.api.context import Service
-from service.kinds import KINDS
+from service.kinds.queued import QUEUED
 from service.settings import read_settings
 
 JSON = dict[str, Any]
@@ -216,7 +216,7 @@ def test_acceptance_at_the_terminal(bars: Path) -> None:
 def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
     data = tmp_path_factory.mktemp("data")
     settings = read_settings(data_dir=data, workers_per_job=1)
-    service = Service(settings, KINDS, InThisProcess())
+    service = Service(settings, QUEUED, InThisProcess())
     with TestClient(create_app(service)) as opened:
         yield opened
     service.close()

@@ -21,7 +21,7 @@ from rig.design.designfile import design_from_mapping
 from service import work
 from service.api.app import create_app
 from service.api.context import Service
-from service.kinds import KINDS
+from service.kinds.queued import QUEUED
 from service.settings import read_settings
 
 JSON = dict[str, Any]
@@ -44,7 +44,7 @@ def ended(client: TestClient, answer: Any) -> JSON:  # noqa: ANN401 - a response
 @pytest.fixture(scope="module")
 def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
     settings = read_settings(data_dir=tmp_path_factory.mktemp("data"), workers_per_job=1)
-    service = Service(settings, KINDS)
+    service = Service(settings, QUEUED)
     with TestClient(create_app(service)) as opened:
         yield opened
     service.close()

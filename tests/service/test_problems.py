@@ -13,7 +13,8 @@ from common import errors
 from common.files.plain import plain
 from service.api import picturesets, targetsets
 from service.api.app import make_app
-from service.kinds import KINDS as JOB_KINDS
+from service.ipc import error_fields, error_from_fields
+from service.kinds.queued import QUEUED as JOB_KINDS
 from service.logs import JsonLines, job_id
 from service.problems import (
     HTTP_ERRORS,
@@ -23,11 +24,10 @@ from service.problems import (
     problem_document,
     status_of,
 )
-from service.rigs.orders import RIG_KINDS
 from service.settings import PREFIX, Settings
+from service.stations.registry import STATION_KINDS
 from service.store.blobs import Staging
 from service.store.jobs import Jobs
-from service.wire import error_fields, error_from_fields
 
 
 def all_errors() -> list[type[errors.RigwrightError]]:
@@ -189,7 +189,7 @@ def test_the_guide_lists_every_error() -> None:
 def test_the_guide_lists_no_error_that_cannot_come() -> None:
     listed = set(re.findall(r"`((?:" + "|".join(KINDS) + r")/[a-z-]+)`", GUIDE))
     framework = {f"{kind}/{detail}" for kind, detail, _ in HTTP_ERRORS.values()}
-    stored = (*JOB_KINDS, *RIG_KINDS, targetsets.KIND, picturesets.KIND)
+    stored = (*JOB_KINDS, *STATION_KINDS, targetsets.KIND, picturesets.KIND)
     of_job_kinds = {f"not-found/{kind}" for kind in stored}
     of_rigs = codes_in_the_code("rig") | codes_in_the_code("calibration")
     assert listed - codes_in_the_code() - of_rigs - framework - of_job_kinds == set()

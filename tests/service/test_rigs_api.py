@@ -22,8 +22,8 @@ from rig.acquisition.trigger.fake.program import FakeTrigger, start_fake
 from rig.devices.station import open_station
 from service.api.app import create_app
 from service.api.context import Service
-from service.kinds import KINDS
-from service.rigs.orders import CAPTURE
+from service.kinds.queued import QUEUED
+from service.kinds.rigs import CAPTURE
 from service.settings import read_settings
 from service.store import Store
 from service.store.jobrecords import NewJob
@@ -36,7 +36,7 @@ ENDED = {"completed", "failed", "cancelled", "interrupted"}
 @contextmanager
 def running(data: Path, station: Path) -> Iterator[TestClient]:
     settings = read_settings(data_dir=data, stations=[station])
-    service = Service(settings, KINDS)
+    service = Service(settings, QUEUED)
     try:
         with TestClient(create_app(service), raise_server_exceptions=False) as client:
             wait_for(lambda: client.get("/v1/rigs/studio").json()["status"] != "closed")
@@ -218,7 +218,7 @@ class TestDevicesThatAreNotWell:
     def test_a_rig_that_cannot_be_opened_says_why_and_is_tried_again(self, tmp_path: Path) -> None:
         link = tmp_path / "box"
         station = write_station(tmp_path / "in", url=str(link))
-        service = Service(read_settings(data_dir=tmp_path / "data", stations=[station]), KINDS)
+        service = Service(read_settings(data_dir=tmp_path / "data", stations=[station]), QUEUED)
         with TestClient(create_app(service)) as client:
             wait_for(lambda: client.get("/v1/rigs/studio").json()["problem"])
             refused = client.post("/v1/rigs/studio/captures", json={"capture_id": "one"})
@@ -281,8 +281,8 @@ def test_a_capture_that_a_crash_cut_off_from_the_store_is_found_again(tmp_path: 
     station, data = write_station(tmp_path / "in"), tmp_path / "data"
     request = {"rig": "studio", "session": "s", "capture_id": "one", "shots": 1}
     with Store(data) as store:
-        store.jobs.begin(NewJob(CAPTURE, request), "one")
-        store.jobs.begin(NewJob(CAPTURE, request | {"capture_id": "two"}), "two")
+        store.jobs.begin(NewJob(CAPTURE.name, request), "one")
+        store.jobs.begin(NewJob(CAPTURE.name, request | {"capture_id": "two"}), "two")
     # The capture reached the disk; the service died before it could write so into its store.
     with (
         open_station(read_station(station)) as rig,

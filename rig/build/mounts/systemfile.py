@@ -115,6 +115,14 @@ class SystemFile(StrictModel):
             currency=self.currency,
         )
 
+    def checked(self, catalogue: Catalogue, name: str = "mount") -> SystemSpec:
+        """The same; :class:`InputError`, with ``name`` before it, for parts that there are not."""
+        try:
+            return self.to_spec(catalogue)
+        except NotFoundError as error:
+            # It is not what was asked for that is missing, but what the file names.
+            raise InputError(error.detail, f"{name}: {error.problem}", error.remedy) from error
+
     def _system(self, catalogue: Catalogue) -> MountSystem:
         profile = profile_named(self.profile or _PROFILES[self.kind], catalogue)
         if self.kind == "plate":
@@ -138,17 +146,18 @@ def system_from_mapping(
     data: Mapping[str, object], name: str = "mount", catalogue: Catalogue | None = None
 ) -> SystemSpec:
     """A mount system from parsed TOML or JSON; ``name`` stands in front of every error."""
-    file = validated(SystemFile, data, name)
-    try:
-        return file.to_spec(catalogue or load_catalogue())
-    except NotFoundError as error:
-        # It is not what was asked for that is missing, but what the file names.
-        raise InputError(error.detail, f"{name}: {error.problem}", error.remedy) from error
+    return validated(SystemFile, data, name).checked(catalogue or load_catalogue(), name)
 
 
 def parse_system(text: str, name: str = "mount", catalogue: Catalogue | None = None) -> SystemSpec:
     """A mount system from the text of a file; raises a one-line :class:`InputError`."""
     return system_from_mapping(parsed(text, name, "mount", "system file"), name, catalogue)
+
+
+def read_system_file(path: Path) -> SystemFile:
+    """The same before its parts are looked up: as it can be handed on."""
+    data = parsed(read_text(path, "mount", "system file"), path.name, "mount", "system file")
+    return validated(SystemFile, data, path.name)
 
 
 def read_system(path: Path, catalogue: Catalogue | None = None) -> SystemSpec:

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from calibration.defaults import LENGTH_LIMIT, VOLUME_MM
 from service.cli.options import (
     CaptureOption,
     ForceOption,
@@ -32,11 +30,11 @@ def accept(
             metavar="A K B",
             help="Largest error of a length L: A + K L, at most B (um, um per m, um).",
         ),
-    ] = (20.0, 50.0, 50.0),
+    ] = LENGTH_LIMIT,
     volume: Annotated[
         tuple[float, float, float],
         typer.Option(metavar="W H D", help="The volume measured in, mm."),
-    ] = (300.0, 300.0, 200.0),
+    ] = VOLUME_MM,
     capture: CaptureOption = None,
     rig: Annotated[str, typer.Option(help="For the certificate.")] = "",
     operator: Annotated[str, typer.Option(help="For the certificate.")] = "",
@@ -55,51 +53,33 @@ def accept(
 
     Example:  rigwright accept bar-pictures --reference calibration --targets bar.toml --out test
     """
-    options = Accepting(reference, target_set, limit, volume, rig, operator, temperature, workers)
-    run_accept_command(pictures, capture, out, options, as_json=as_json, force=force)
-
-
-@dataclass(frozen=True)
-class Accepting:
-    """What to test with, and against which limit."""
-
-    reference: Path
-    targets: Path
-    limit: tuple[float, float, float]
-    volume: tuple[float, float, float]
-    rig: str
-    operator: str
-    temperature_degc: float | None
-    workers: int | None
-
-
-def run_accept_command(
-    pictures: Path,
-    captures: Sequence[str] | None,
-    out: Path,
-    options: Accepting,
-    *,
-    as_json: bool,
-    force: bool,
-) -> None:
-    """Test, write the certificate into ``out``; the exit code tells whether it was passed."""
     from common.files.folders import new_folder
-    from service.cli.output import NOT_WELL
-    from service.cli.pictures import asked, given, reference_file, show_measured
+    from common.files.ownership import files_of
+    from service.cli.output import NOT_WELL, print_result_json
+    from service.cli.pictures import picture_source, reference_file
     from service.cli.running import one_line_errors, run_task
+    from service.cli.tables import measurement_tables
+    from service.cli.tables.design_tables import print_files
+    from service.kinds.acceptance import ACCEPTANCE, AcceptanceRequest, Limit, MeasuredVolume
 
     with one_line_errors():
-        request, inputs = asked(pictures, captures, options.workers)
-        request |= {
-            "limit": options.limit,
-            "volume": options.volume,
-            "rig": options.rig,
-            "operator": options.operator,
-            "temperature_degc": options.temperature_degc,
-        }
-        inputs |= {"calibration": reference_file(options.reference), "targets": options.targets}
-        with new_folder(out, force=force, spare=given(pictures, inputs)) as folder:
-            result = run_task("service.tasks.calibrating:acceptance", request, inputs, folder)
-        show_measured("acceptance", result, out, as_json=as_json)
-    if result["outcome"] != "passed":
+        source = picture_source(pictures, capture, workers)
+        (a_um, k_um_per_m, b_um), (width_mm, height_mm, depth_mm) = limit, volume
+        request = AcceptanceRequest(
+            limit=Limit(a_um=a_um, k_um_per_m=k_um_per_m, b_um=b_um),
+            volume=MeasuredVolume(width_mm=width_mm, height_mm=height_mm, depth_mm=depth_mm),
+            rig=rig,
+            operator=operator,
+            temperature_degc=temperature,
+        )
+        calibration = reference_file(reference)
+        inputs = {**source.inputs, "calibration": calibration, "targets": target_set}
+        with new_folder(out, force=force, spare=[pictures, *inputs.values()]) as folder:
+            result = run_task(ACCEPTANCE, request, inputs, folder, source.run)
+        if as_json:
+            print_result_json(result, files_of(out))
+        else:
+            measurement_tables.print_acceptance(result)
+            print_files(files_of(out))
+    if result.outcome != "passed":
         raise typer.Exit(NOT_WELL)

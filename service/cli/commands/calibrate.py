@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
-from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -14,12 +11,12 @@ from service.cli.options import (
     CaptureOption,
     ForceOption,
     JsonOption,
-    LensParameter,
     OutOption,
     PicturesArgument,
     TargetsOption,
     WorkersOption,
 )
+from service.kinds.lens import LensParameter
 
 
 def calibrate(
@@ -62,47 +59,35 @@ def calibrate(
 
     Example:  rigwright calibrate pictures --targets targets/targets.toml --out calibration
     """
-    options = Calibrating(
-        design, tuple(hold or ()), tuple(free or ()), poses_known_to, name, workers
-    )
-    run_calibrate_command(pictures, capture, target_set, out, options, as_json=as_json, force=force)
+    import shutil
 
-
-@dataclass(frozen=True)
-class Calibrating:
-    """How to calibrate."""
-
-    design: Path | None
-    hold: tuple[str, ...]
-    free: tuple[str, ...]
-    poses_known_to: tuple[float, float] | None
-    name: str
-    workers: int | None
-
-
-def run_calibrate_command(
-    pictures: Path,
-    captures: Sequence[str] | None,
-    targets: Path,
-    out: Path,
-    options: Calibrating,
-    *,
-    as_json: bool,
-    force: bool,
-) -> None:
-    """Calibrate and write into ``out``, with a copy of the target set for later checks."""
     from common.files.folders import new_folder
-    from service.cli.pictures import TARGETS, asked, given, show_measured
+    from common.files.ownership import files_of
+    from service.cli.output import print_result_json
+    from service.cli.pictures import TARGETS, picture_source
     from service.cli.running import one_line_errors, run_task
+    from service.cli.tables import measurement_tables
+    from service.cli.tables.design_tables import print_files
+    from service.kinds.calibration import CALIBRATION, CalibrationRequest, KnownPoses
 
     with one_line_errors():
-        request, inputs = asked(pictures, captures, options.workers)
-        request |= {"name": options.name, "hold": options.hold, "free": options.free}
-        request |= {"poses_known_to": options.poses_known_to}
-        inputs |= {"targets": targets}
-        if options.design is not None:
-            inputs["design"] = options.design
-        with new_folder(out, force=force, spare=given(pictures, inputs)) as folder:
-            result = run_task("service.tasks.calibrating:calibration", request, inputs, folder)
-            shutil.copyfile(targets, folder / TARGETS)
-        show_measured("calibration", result, out, as_json=as_json)
+        source = picture_source(pictures, capture, workers)
+        known = None
+        if poses_known_to is not None:
+            sigma_mm, sigma_deg = poses_known_to
+            known = KnownPoses(position_sigma_mm=sigma_mm, rotation_sigma_deg=sigma_deg)
+        request = CalibrationRequest(
+            name=name, hold=hold or [], free=free or [], poses_known_to=known
+        )
+        inputs = {**source.inputs, "targets": target_set}
+        if design is not None:
+            inputs["design"] = design
+        with new_folder(out, force=force, spare=[pictures, *inputs.values()]) as folder:
+            result = run_task(CALIBRATION, request, inputs, folder, source.run)
+            # For later checks.
+            shutil.copyfile(target_set, folder / TARGETS)
+        if as_json:
+            print_result_json(result, files_of(out))
+            return
+        measurement_tables.print_calibration(result)
+        print_files(files_of(out))

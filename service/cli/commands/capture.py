@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import secrets
-from contextlib import ExitStack
-from dataclasses import dataclass
-from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -17,8 +13,9 @@ if TYPE_CHECKING:
     from rig.acquisition.capture.results import CaptureResult
     from rig.acquisition.capture.rig import Rig
     from rig.acquisition.session.folder import Session
+    from service.kinds.rigs import CaptureRequest
 
-JSON = dict[str, Any]
+SESSIONS = Path("sessions")
 
 
 def capture(
@@ -69,101 +66,95 @@ def capture(
 
     Example:  rigwright capture --station station.toml --subject anna
     """
-    asked = Asked(
-        capture_id, subject, operator, shots, interval_ms * 1e3, allow_partial, count, pause_s
-    )
-    run_capture_command(station, session, asked, dry_run=dry_run, as_json=as_json)
+    from contextlib import ExitStack
+    from datetime import datetime
+    from secrets import token_hex
 
-
-SESSIONS = Path("sessions")
-
-
-@dataclass(frozen=True)
-class Asked:
-    """What a capture was asked for with."""
-
-    capture_id: str | None
-    subject: str
-    operator: str
-    shots: int
-    interval_us: float
-    allow_partial: bool | None
-    count: int = 1
-    pause_s: float = 0.0
-
-
-def run_capture_command(
-    station: Path, folder: Path | None, asked: Asked, *, dry_run: bool, as_json: bool
-) -> None:
-    """Take captures, or rehearse one."""
     from common.errors import CancelledError, InputError
     from rig.acquisition.station.stationfile import read_station
     from rig.devices.station import open_station
     from service.cli.output import show
-    from service.cli.progress import show_progress, told
+    from service.cli.progress import show_progress
     from service.cli.running import cancel_on_signal, one_line_errors
+    from service.kinds.rigs import CaptureRequest
 
     with one_line_errors(), ExitStack() as stack:
-        if asked.count > 1 and asked.capture_id is not None:
+        if count > 1 and capture_id is not None:
             raise InputError(
                 "capture-id-count",
                 "captures of one id are one capture",
                 "leave --id or --count out",
             )
-        rig = stack.enter_context(open_station(read_station(station)))
+        requests = [
+            CaptureRequest(
+                capture_id=capture_id or f"cap-{datetime.now():%Y%m%dT%H%M%S}-{token_hex(3)}",
+                subject=subject,
+                operator=operator,
+                shots=shots,
+                interval_us=interval_ms * 1e3,
+                allow_partial=allow_partial,
+            )
+            for _ in range(count)
+        ]
+        opened = stack.enter_context(open_station(read_station(station)))
         cancel = stack.enter_context(cancel_on_signal())
-        report = told(stack.enter_context(show_progress()))
+        report = stack.enter_context(show_progress())
         if dry_run:
-            dry = rig.dry_run(
-                shots=asked.shots,
-                interval_us=asked.interval_us,
-                allow_partial=asked.allow_partial,
+            dry = opened.dry_run(
+                shots=shots,
+                interval_us=interval_ms * 1e3,
+                allow_partial=allow_partial,
                 progress=report,
                 cancel=cancel,
             )
-            show({"ready": dry.ready, "faults": [f.text for f in dry.faults]}, as_json=as_json)
+            faults = [fault.text for fault in dry.faults]
+            show({"ready": list(dry.ready), "faults": faults}, as_json=as_json)
             return
-        session = stack.enter_context(_session(rig, folder, asked))
-        for number in range(asked.count):
-            if number and cancel.wait(asked.pause_s):
+        filed = stack.enter_context(_session(opened, session, requests[0]))
+        for number, request in enumerate(requests):
+            if number and cancel.wait(pause_s):
                 raise CancelledError
-            result = rig.capture(
-                session,
-                asked.capture_id or f"cap-{datetime.now():%Y%m%dT%H%M%S}-{secrets.token_hex(3)}",
-                shots=asked.shots,
-                interval_us=asked.interval_us,
-                allow_partial=asked.allow_partial,
+            result = opened.capture(
+                filed,
+                request.capture_id,
+                shots=request.shots,
+                interval_us=request.interval_us,
+                allow_partial=request.allow_partial,
                 progress=report,
                 cancel=cancel,
             )
-            show(_capture_figures(result), as_json=as_json)
+            _show(result, as_json=as_json)
             if result.error is not None:
                 raise result.error
 
 
-def _session(rig: Rig, folder: Path | None, asked: Asked) -> Session:
+def _session(rig: Rig, folder: Path | None, request: CaptureRequest) -> Session:
     from common.errors import NotFoundError
     from rig.acquisition.session.folder import Session, session_folder
 
     if folder is None:
-        return rig.new_session(
-            session_folder(SESSIONS, asked.subject), asked.subject, asked.operator
-        )
+        new = session_folder(SESSIONS, request.subject)
+        return rig.new_session(new, request.subject, request.operator)
     try:
         return Session.open(folder)
     except NotFoundError:
         if folder.exists():
             raise
-        return rig.new_session(folder, asked.subject, asked.operator)
+        return rig.new_session(folder, request.subject, request.operator)
 
 
-def _capture_figures(result: CaptureResult) -> JSON:
+def _show(result: CaptureResult, *, as_json: bool) -> None:
+    from service.cli.output import show
+
     record = result.record
-    return {
-        "capture": record.capture_id,
-        "session": str(result.folder),
-        "state": record.state,
-        "synchronised": record.verdict.text,
-        "faults": [fault.text for fault in record.faults],
-        "pictures": [str(result.folder / frame.file.path) for frame in record.frames],
-    }
+    show(
+        {
+            "capture": record.capture_id,
+            "session": str(result.folder),
+            "state": record.state,
+            "synchronised": record.verdict.text,
+            "faults": [fault.text for fault in record.faults],
+            "pictures": [str(result.folder / frame.file.path) for frame in record.frames],
+        },
+        as_json=as_json,
+    )

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from calibration.defaults import HIDDEN_LIMIT_MM, TOLERANCE_MM
 from service.cli.options import (
     CaptureOption,
     ForceOption,
@@ -18,6 +17,8 @@ from service.cli.options import (
     ReferenceOption,
     WorkersOption,
 )
+
+HISTORY_PAGE = "history.html"
 
 
 def check(
@@ -44,10 +45,10 @@ def check(
     ] = None,
     tolerance_mm: Annotated[
         float, typer.Option(min=0.0, help="Smaller effects at the subject turn no light red.")
-    ] = 0.02,
+    ] = TOLERANCE_MM,
     hidden_limit_mm: Annotated[
         float, typer.Option(min=1e-6, help="A camera that could hide more is not called fine.")
-    ] = 0.1,
+    ] = HIDDEN_LIMIT_MM,
     workers: WorkersOption = None,
     as_json: JsonOption = False,
     force: ForceOption = False,
@@ -58,57 +59,34 @@ def check(
 
     Example:  rigwright check sessions/today --reference calibration --out check
     """
-    options = Checking(reference, target_set, history, tolerance_mm, hidden_limit_mm, workers)
-    run_check_command(pictures, capture, out, options, as_json=as_json, force=force)
-
-
-HISTORY_PAGE = "history.html"
-
-
-@dataclass(frozen=True)
-class Checking:
-    """What to check against, and what matters."""
-
-    reference: Path
-    targets: Path | None
-    history: Path | None
-    tolerance_mm: float
-    hidden_limit_mm: float
-    workers: int | None
-
-
-def run_check_command(
-    pictures: Path,
-    captures: Sequence[str] | None,
-    out: Path,
-    options: Checking,
-    *,
-    as_json: bool,
-    force: bool,
-) -> None:
-    """Check, write into ``out``, and end with an exit code that scripts can go by."""
     from common.files.folders import new_folder
-    from service.cli.output import NOT_WELL
-    from service.cli.pictures import asked, given, reference_file, show_measured
+    from common.files.ownership import files_of
+    from service.cli.output import NOT_WELL, print_result_json
+    from service.cli.pictures import picture_source, reference_file
     from service.cli.running import one_line_errors, run_task
+    from service.cli.tables import measurement_tables
+    from service.cli.tables.design_tables import print_files
+    from service.kinds.check import CHECK, CheckRequest
 
     with one_line_errors():
-        request, inputs = asked(pictures, captures, options.workers)
-        request |= {
-            "tolerance_mm": options.tolerance_mm,
-            "hidden_limit_mm": options.hidden_limit_mm,
+        source = picture_source(pictures, capture, workers)
+        request = CheckRequest(tolerance_mm=tolerance_mm, hidden_limit_mm=hidden_limit_mm)
+        inputs = {
+            **source.inputs,
+            "calibration": reference_file(reference),
+            "targets": target_set or _targets_beside(reference),
+            **_earlier(history),
         }
-        inputs |= {
-            "calibration": reference_file(options.reference),
-            "targets": options.targets or _targets_beside(options.reference),
-            **_earlier(options.history),
-        }
-        with new_folder(out, force=force, spare=given(pictures, inputs)) as folder:
-            result = run_task("service.tasks.calibrating:rig_check", request, inputs, folder)
-        if options.history is not None:
-            _add_to_history(out, options.history, request["made_utc"])
-        show_measured("check", result, out, as_json=as_json)
-    if result["light"] == "red":
+        with new_folder(out, force=force, spare=[pictures, *inputs.values()]) as folder:
+            result = run_task(CHECK, request, inputs, folder, source.run)
+        if history is not None:
+            _add_to_history(out, history, source.run.made_utc)
+        if as_json:
+            print_result_json(result, files_of(out))
+        else:
+            measurement_tables.print_check(result)
+            print_files(files_of(out))
+    if result.light == "red":
         raise typer.Exit(NOT_WELL)
 
 

@@ -22,12 +22,10 @@ def demo(
 
     Example:  rigwright demo --out demo
     """
-    run_demo_command(out, workers, as_json=as_json, force=force)
+    from service.cli.commands.design import run_design
+    from service.cli.running import processes
+    from service.kinds.base import RunContext
+    from service.kinds.design import DEMO, DemoRequest
 
-
-def run_demo_command(out: Path, workers: int | None, *, as_json: bool, force: bool) -> None:
-    """Design the example rig for the bundled head."""
-    from service.cli.commands.design import Overrides, run_design
-
-    request = Overrides(workers=workers).request()
-    run_design("service.tasks.designing:demo", request, {}, out, as_json=as_json, force=force)
+    run = RunContext(workers=processes(workers))
+    run_design(DEMO, DemoRequest, {}, run, out, as_json=as_json, force=force)

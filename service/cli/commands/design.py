@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import json
-import os
 import sys
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from service.cli.options import ForceOption, JsonOption, RigOption, ScanArgument, WorkersOption
 
-JSON = dict[str, Any]
+if TYPE_CHECKING:
+    from service.kinds.base import JobKind, RequestT, RunContext
+    from service.kinds.design import DesignResult
 
 
 def design(
@@ -53,83 +53,74 @@ def design(
 
     Example:  rigwright design head.glb --rig face.toml --out rig --cameras 7
     """
-    run_design_command(
-        scan, rig, out, Overrides(cameras, seed, starts, workers), as_json=as_json, force=force
-    )
+    from rig.specification.rigfile import read_rig_file
+    from service.cli.running import processes, require_files
+    from service.kinds.base import RunContext
+    from service.kinds.design import DESIGN, DesignRequest
 
+    def request() -> DesignRequest:
+        require_files([scan, rig])
+        return DesignRequest(rig=read_rig_file(rig), cameras=cameras, seed=seed, starts=starts)
 
-@dataclass(frozen=True)
-class Overrides:
-    """What the command line says instead of the rig file; None leaves it."""
-
-    cameras: int | None = None
-    seed: int | None = None
-    starts: int | None = None
-    workers: int | None = None
-
-    def request(self) -> JSON:
-        """As the work understands it."""
-        return asdict(self) | {"workers": self.workers or os.cpu_count() or 1}
-
-
-def run_design_command(
-    scan: Path, rig: Path, out: Path, overrides: Overrides, *, as_json: bool, force: bool
-) -> None:
-    """Design for ``scan`` and write into ``out``."""
-    request = overrides.request() | {"scan_name": scan.name}
-    inputs = {"scan": scan, "rig": rig}
+    run = RunContext(workers=processes(workers), scan_name=scan.name)
     run_design(
-        "service.tasks.designing:design_from_files",
-        request,
-        inputs,
-        out,
-        as_json=as_json,
-        force=force,
+        DESIGN, request, {"scan": scan}, run, out, spare=[scan, rig], as_json=as_json, force=force
     )
 
 
 def run_design(
-    entry: str, request: JSON, inputs: dict[str, Path], out: Path, *, as_json: bool, force: bool
+    kind: JobKind[RequestT, DesignResult],
+    request: Callable[[], RequestT],
+    inputs: Mapping[str, Path],
+    run: RunContext,
+    out: Path,
+    *,
+    spare: Sequence[Path] = (),
+    as_json: bool,
+    force: bool,
 ) -> None:
-    """Run the work and show what came of it."""
+    """Run a kind of job that designs, and show what came of it."""
     from common.files.folders import new_folder
-    from common.files.ownership import files_of
     from service.cli.running import one_line_errors, run_task
     from service.cli.scans import remember_scan
     from service.problems import EXIT_INFEASIBLE
 
     with one_line_errors():
-        with new_folder(out, force=force, spare=inputs.values()) as folder:
-            result = run_task(entry, request, inputs, folder)
+        with new_folder(out, force=force, spare=spare) as folder:
+            result = run_task(kind, request(), inputs, folder, run)
             if "scan" in inputs:
                 remember_scan(folder, out, inputs["scan"])
-        _show(result, files_of(out), as_json=as_json)
-    if not result["feasible"]:
+        _show(result, out, as_json=as_json)
+    if not result.feasible:
         raise typer.Exit(EXIT_INFEASIBLE)
 
 
-def _show(result: JSON, files: dict[str, Path], *, as_json: bool) -> None:
-    constraints = json.loads(files["design.json"].read_text(encoding="utf-8"))["constraints"]
+def _show(result: DesignResult, out: Path, *, as_json: bool) -> None:
+    from common.files.ownership import files_of
+    from rig.design.designfile import read_design
+    from service.cli.output import print_result_json
+
+    files = files_of(out)
+    constraints = read_design(files["design.json"]).file.constraints or []
     if as_json:
-        paths = {name: str(path) for name, path in files.items()}
-        document = {"result": result, "constraints": constraints, "files": paths}
-        sys.stdout.write(json.dumps(document, indent=2) + "\n")
+        rows = [row.model_dump(mode="json") for row in constraints]
+        print_result_json(result, files, constraints=rows)
     else:
         from service.cli.tables import design_tables
 
         design_tables.print_notes(result)
-        design_tables.print_figures(result)
+        design_tables.print_figures(result, result.start_cost_mm2)
         design_tables.print_limits(constraints)
-        if result["conflicts"]:
+        if result.conflicts:
             design_tables.print_conflicts(result)
         design_tables.print_files(files)
-    if not result["feasible"]:
+    if not result.feasible:
         sys.stderr.write(f"rigwright: {_why_infeasible(result)}\n")
 
 
-def _why_infeasible(result: JSON) -> str:
-    families = list(dict.fromkeys(name.split("/", 1)[0] for name in result["violated"]))
-    in_conflict = [row["family"] for row in result["conflicts"]] or families
+def _why_infeasible(result: DesignResult) -> str:
+    families = list(dict.fromkeys(name.split("/", 1)[0] for name in result.violated))
+    in_conflict = [row.family for row in result.conflicts] or families
     return (
         f"the limits cannot all be met ({', '.join(in_conflict)}); the nearest design was written, "
         "relax one of them"

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import sys
-import tempfile
 from pathlib import Path
 from typing import Annotated
 
@@ -28,25 +25,32 @@ def evaluate(
 
     Example:  rigwright evaluate rig/design.json head.glb --rig face.toml
     """
-    run_evaluate_command(design_file, scan, rig, as_json=as_json)
+    import json
+    import tempfile
 
+    from rig.design.designfile import read_design
+    from rig.design.designmodel import ConstraintFigures
+    from rig.specification.rigfile import read_rig_file
+    from service.cli.output import print_result_json
+    from service.cli.running import one_line_errors, require_files, run_task
+    from service.kinds.evaluation import EVALUATION, EvaluationRequest
 
-def run_evaluate_command(design_file: Path, scan: Path, rig: Path, *, as_json: bool) -> None:
-    """Score the cameras of ``design_file`` on ``scan`` against the limits of ``rig``."""
-    from service.cli.running import one_line_errors, run_task
-
-    inputs = {"scan": scan, "rig": rig, "design": design_file}
     with one_line_errors(), tempfile.TemporaryDirectory(prefix="rigwright-") as temporary:
+        require_files([design_file, scan, rig])
+        rig_file = read_rig_file(rig)
+        placed = read_design(design_file, rig_file.to_spec().camera).file
+        request = EvaluationRequest(rig=rig_file, design=placed)
         folder = Path(temporary) / "files"
         folder.mkdir()
-        result = run_task("service.tasks.designing:evaluation_from_files", {}, inputs, folder)
+        result = run_task(EVALUATION, request, {"scan": scan}, folder)
         document = json.loads((folder / "evaluation.json").read_text(encoding="utf-8"))
+        constraints = [ConstraintFigures.model_validate(row) for row in document["constraints"]]
         if as_json:
-            shown = {"result": result, "constraints": document["constraints"]}
-            sys.stdout.write(json.dumps(shown, indent=2) + "\n")
-        else:
-            from service.cli.tables import design_tables
+            rows = [row.model_dump(mode="json") for row in constraints]
+            print_result_json(result, {}, constraints=rows)
+            return
+        from service.cli.tables import design_tables
 
-            design_tables.print_notes(result)
-            design_tables.print_figures(result)
-            design_tables.print_limits(document["constraints"])
+        design_tables.print_notes(result)
+        design_tables.print_figures(result)
+        design_tables.print_limits(constraints)

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-JSON = dict[str, Any]
+from service.kinds.defaults import PAPER
+
+if TYPE_CHECKING:
+    from service.kinds.plan import PlanResult
 
 
 def plan(
@@ -38,14 +40,12 @@ def plan(
     ] = None,
     name: Annotated[str, typer.Option(help="What to call it; as the design without it.")] = "",
     seed: Annotated[int, typer.Option(min=0, help="Of the trials of tolerances.")] = 0,
-    paper: Annotated[str, typer.Option(help="Of drilling templates: A4 or A3.")] = "A4",
+    paper: Annotated[str, typer.Option(help="Of drilling templates: A4 or A3.")] = PAPER,
     step: Annotated[bool, typer.Option("--step", help="Write printed parts as STEP too.")] = False,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print one JSON document instead of tables.")
     ] = False,
-    force: Annotated[
-        bool, typer.Option("--force", help="Replace a former plan in the folder.")
-    ] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace what is in the folder.")] = False,
 ) -> None:
     """Plan what holds the cameras: parts to cut, drill and print, settings, drawings, steps.
 
@@ -55,71 +55,47 @@ def plan(
 
     Example:  rigwright plan rig/design.json --mount t-slot.toml --out plan
     """
-    run_plan_command(
-        design, mount, scan, out, Planning(name, seed, paper, step), as_json=as_json, force=force
-    )
-
-
-PAPERS = ("A4", "A3")
-
-
-@dataclass(frozen=True)
-class Planning:
-    """How to plan."""
-
-    name: str
-    seed: int
-    paper: str
-    step: bool
-
-
-def run_plan_command(
-    design: Path,
-    mount: Path,
-    scan: Path | None,
-    out: Path,
-    options: Planning,
-    *,
-    as_json: bool,
-    force: bool,
-) -> None:
-    """Plan and write into ``out``."""
     from common.errors import InputError
     from common.files.folders import new_folder
-    from service.cli.running import one_line_errors, run_task
+    from rig.build.mounts.systemfile import read_system_file
+    from service.cli.running import one_line_errors, require_files, run_task
     from service.cli.scans import scan_of
+    from service.kinds.plan import PAPERS, PLAN, PlanRequest
     from service.problems import EXIT_INFEASIBLE
 
     with one_line_errors():
-        if options.paper not in PAPERS:
-            raise InputError("paper", f"there is no paper {options.paper!r}", "give A4 or A3")
-        inputs = {"design": design, "mount": mount, "scan": scan or scan_of(design)}
-        with new_folder(out, force=force, spare=inputs.values()) as folder:
-            result = run_task("service.tasks.planning:plan", asdict(options), inputs, folder)
+        if paper not in PAPERS:
+            raise InputError("paper", f"there is no paper {paper!r}", "give A4 or A3")
+        head = scan or scan_of(design)
+        with new_folder(out, force=force, spare=[design, mount, head]) as folder:
+            require_files([design, mount, head])
+            request = PlanRequest(
+                mount=read_system_file(mount), name=name, seed=seed, paper=PAPERS[paper], step=step
+            )
+            result = run_task(PLAN, request, {"design": design, "scan": head}, folder)
         _show(result, out, as_json=as_json)
-    if not result["buildable"]:
+    if not result.buildable:
         sys.stderr.write(f"rigwright: {_why(result)}\n")
         raise typer.Exit(EXIT_INFEASIBLE)
 
 
-def _why(result: JSON) -> str:
-    first, more = result["clashes"][0], len(result["clashes"]) - 1
-    what = "stands in the view of" if first["kind"] == "view" else "is in the way of"
+def _why(result: PlanResult) -> str:
+    first, more = result.clashes[0], len(result.clashes) - 1
+    what = "stands in the view of" if first.kind == "view" else "is in the way of"
     return (
-        f"{first['other']} {what} {first['one']}{f', and {more} more' if more else ''}; the plan "
+        f"{first.other} {what} {first.one}{f', and {more} more' if more else ''}; the plan "
         "was written, but cannot be built so: try another mount or other zones"
     )
 
 
-def _show(result: JSON, out: Path, *, as_json: bool) -> None:
+def _show(result: PlanResult, out: Path, *, as_json: bool) -> None:
     from common.files.ownership import files_of
-    from service.cli.output import print_json
+    from service.cli.output import print_result_json
+    from service.cli.tables import plan_tables
 
     files = files_of(out)
     if as_json:
-        print_json({"result": result, "files": {name: str(path) for name, path in files.items()}})
+        print_result_json(result, files)
         return
-    from service.cli.tables import plan_tables
-
     plan_tables.print_plan(result)
     sys.stdout.write(f"Written: {len(files)} files under {out}, begin with {out / 'plan.html'}\n")

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from service.cli.options import JsonOption, StationOption
+from service.kinds.defaults import SYNC_CAPTURES
 
 if TYPE_CHECKING:
-    from rig.acquisition.capture.results import SelfTest, SyncCheck
+    from service.kinds.rigs import RigTestOutcome
 
 rig = typer.Typer(name="rig", help="Look at a rig that stands.", no_args_is_help=True)
 
@@ -23,7 +24,9 @@ def rig_check(
     fire: Annotated[
         bool, typer.Option("--fire/--no-fire", help="Whether to measure the synchronisation.")
     ] = True,
-    captures: Annotated[int, typer.Option(min=1, max=100, help="Captures to measure from.")] = 3,
+    captures: Annotated[int, typer.Option(min=1, max=100, help="Captures to measure from.")] = (
+        SYNC_CAPTURES
+    ),
     write: Annotated[
         bool, typer.Option("--write", help="Write the delays it finds to the station file.")
     ] = False,
@@ -44,43 +47,51 @@ def run_rig_check_command(station: Path, captures: int, *, write: bool, as_json:
     from rig.acquisition.station.stationfile import read_station
     from rig.devices.station import open_station
     from service.cli.output import NOT_WELL, print_json
-    from service.cli.progress import show_progress, told
+    from service.cli.progress import show_progress
     from service.cli.running import cancel_on_signal, one_line_errors
-    from service.rigs.orders import self_test_document, sync_document
+    from service.stations.jobs import self_test_outcome, sync_outcome
 
     with one_line_errors(), ExitStack() as stack:
-        rig = stack.enter_context(open_station(read_station(station)))
-        test = rig.self_test()
-        check: SyncCheck | None = None
+        opened = stack.enter_context(open_station(read_station(station)))
+        test = self_test_outcome(opened.self_test())
+        check: RigTestOutcome | None = None
         if test.ok and captures:
             cancel = stack.enter_context(cancel_on_signal())
-            report = told(stack.enter_context(show_progress()))
-            check = rig.sync_check(captures, progress=report, cancel=cancel)
+            report = stack.enter_context(show_progress())
+            measured = opened.sync_check(captures, progress=report, cancel=cancel)
+            written = write and measured.timings is not None
+            if write and measured.timings is not None:
+                write_timings(station, measured.timings)
+            check = sync_outcome(measured, adopted=written)
         stack.close()
-        written = write and check is not None and check.timings is not None
-        if written and check is not None and check.timings is not None:
-            write_timings(station, check.timings)
-        document = {"self_test": self_test_document(test), "written": written}
-        document["sync_check"] = None if check is None else sync_document(check)
         if as_json:
-            print_json(document)
+            print_json(
+                {
+                    "self_test": _json(test),
+                    "sync_check": None if check is None else _json(check),
+                    "written": check is not None and check.adopted,
+                }
+            )
         else:
             _print_checks(test)
             if check is not None:
-                _print_sync(check, written=written)
-    well = test.ok and (check is None or bool(sync_document(check)["ok"]))
-    if not well:
+                _print_sync(check)
+    if not (test.ok and (check is None or check.ok)):
         raise typer.Exit(NOT_WELL)
 
 
-def _print_checks(test: SelfTest) -> None:
+def _json(outcome: RigTestOutcome) -> dict[str, object]:
+    return outcome.model_dump(mode="json", exclude_unset=True)
+
+
+def _print_checks(test: RigTestOutcome) -> None:
     for check in test.checks:
         sys.stdout.write(f"{'ok ' if check.ok else 'BAD'} {check.name}: {check.text}\n")
 
 
-def _print_sync(check: SyncCheck, *, written: bool) -> None:
-    for number, evidence in enumerate(check.captures, 1):
-        sys.stdout.write(f"capture {number}: {evidence.verdict.text}\n")
+def _print_sync(check: RigTestOutcome) -> None:
+    for number, verdict in enumerate(check.verdicts, 1):
+        sys.stdout.write(f"capture {number}: {verdict.text}\n")
     for fault in check.faults:
         sys.stdout.write(f"fault: {fault.text}\n")
     for name, lag in check.lags.items():
@@ -93,4 +104,5 @@ def _print_sync(check: SyncCheck, *, written: bool) -> None:
         return
     for name, timing in check.timings.items():
         sys.stdout.write(f"{name}: delay {timing.delay_us / 1e3:.2f} ms makes up for it\n")
-    sys.stdout.write("written to the station file\n" if written else "--write keeps these delays\n")
+    told = "written to the station file" if check.adopted else "--write keeps these delays"
+    sys.stdout.write(f"{told}\n")

@@ -54,10 +54,10 @@ def run_serve_command(
         # After the settings, so that a mistake in them is told at once.
         from service.api.app import create_app
         from service.api.context import Service
-        from service.kinds import KINDS
+        from service.kinds.queued import QUEUED
         from service.server import serve
 
-        service = Service(settings, KINDS)
+        service = Service(settings, QUEUED)
         try:
             serve(service, create_app(service), _say_where)
         finally:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
 from service.cli.options import ForceOption, JsonOption
-
-JSON = dict[str, Any]
+from service.kinds.defaults import PAGE
 
 
 def targets(
@@ -26,7 +25,7 @@ def targets(
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder to write into.")] = Path(
         "targets"
     ),
-    page: Annotated[str, typer.Option(help="A4, A3, letter, or WIDTHxHEIGHT in mm.")] = "A4",
+    page: Annotated[str, typer.Option(help="A4, A3, letter, or WIDTHxHEIGHT in mm.")] = PAGE,
     as_json: JsonOption = False,
     force: ForceOption = False,
 ) -> None:
@@ -38,22 +37,14 @@ def targets(
 
     Example:  rigwright targets --design rig/design.json --out targets
     """
-    run_targets_command(target_set, design, out, page, as_json=as_json, force=force)
-
-
-def run_targets_command(
-    target_set: Path | None,
-    design: Path | None,
-    out: Path,
-    page: str,
-    *,
-    as_json: bool,
-    force: bool,
-) -> None:
-    """Print a set, or propose one for a rig and print that."""
     from common.errors import InputError
     from common.files.folders import new_folder
+    from common.files.ownership import files_of
+    from service.cli.output import print_result_json
     from service.cli.running import one_line_errors, run_task
+    from service.cli.tables import measurement_tables
+    from service.cli.tables.design_tables import print_files
+    from service.kinds.targets import TARGETS, TargetsRequest
 
     with one_line_errors():
         given = {"targets": target_set, "design": design}
@@ -68,20 +59,9 @@ def run_targets_command(
         renewed = [path for path in inputs.values() if path == out / "targets.toml"]
         spare = [path for path in inputs.values() if path not in renewed]
         with new_folder(out, force=force, spare=spare, renewed=renewed) as folder:
-            result = run_task("service.tasks.targeting:targets", {"page": page}, inputs, folder)
-        _show(result, out, as_json=as_json)
-
-
-def _show(result: JSON, out: Path, *, as_json: bool) -> None:
-    from common.files.ownership import files_of
-    from service.cli.output import print_json
-
-    files = files_of(out)
-    if as_json:
-        print_json({"result": result, "files": {name: str(path) for name, path in files.items()}})
-        return
-    from service.cli.tables import measurement_tables
-    from service.cli.tables.design_tables import print_files
-
-    measurement_tables.print_targets(result)
-    print_files(files)
+            result = run_task(TARGETS, TargetsRequest(page=page), inputs, folder)
+        if as_json:
+            print_result_json(result, files_of(out))
+            return
+        measurement_tables.print_targets(result)
+        print_files(files_of(out))

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
 
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-JSON = dict[str, Any]
+from rig.design.designmodel import ConstraintFigures
+from service.kinds.design import DesignResult
+from service.kinds.evaluation import EvaluationResult
 
 
 def _number(value: float | None, unit: str = "") -> str:
@@ -21,38 +22,37 @@ def _share(value: float | None) -> str:
     return "-" if value is None else f"{100.0 * value:.2f} %"
 
 
-def print_figures(result: JSON) -> None:
-    """The figures of a design or an evaluation."""
+def print_figures(result: EvaluationResult, start_cost_mm2: float | None = None) -> None:
+    """The figures of a design, which has the start's cost as well, or of an evaluation."""
     table = Table("Figure", "Value", title="Quality", title_justify="left")
-    start = result.get("start_cost_mm2")
-    table.add_row("cost, mean |Q|", _number(result["cost_mm2"], "mm\u00b2"))
-    if start is not None:
-        table.add_row("the same at the start", _number(start, "mm\u00b2"))
-    for name, label in (
-        ("sigma_median_mm", "sigma, median"),
-        ("sigma_p95_mm", "sigma, 95 % of points"),
-        ("sigma_max_mm", "sigma, largest"),
+    table.add_row("cost, mean |Q|", _number(result.cost_mm2, "mm\u00b2"))
+    if start_cost_mm2 is not None:
+        table.add_row("the same at the start", _number(start_cost_mm2, "mm\u00b2"))
+    for label, sigma_mm in (
+        ("sigma, median", result.sigma_median_mm),
+        ("sigma, 95 % of points", result.sigma_p95_mm),
+        ("sigma, largest", result.sigma_max_mm),
     ):
-        table.add_row(label, _number(result[name], "mm"))
-    for row in result["coverage"]:
-        table.add_row(f"points seen by {row['views']} or more", _share(row["share"]))
-    table.add_row("views in focus", _share(result["in_focus_share"]))
-    table.add_row("views in frame", _share(result["in_frame_share"]))
+        table.add_row(label, _number(sigma_mm, "mm"))
+    for row in result.coverage:
+        table.add_row(f"points seen by {row.views} or more", _share(row.share))
+    table.add_row("views in focus", _share(result.in_focus_share))
+    table.add_row("views in frame", _share(result.in_frame_share))
     Console().print(table)
 
 
-def print_notes(result: JSON) -> None:
+def print_notes(result: EvaluationResult) -> None:
     """What was inferred or changed to read the scan and find the face."""
     console = Console(highlight=False)
-    for note in result["notes"]:
-        console.print(f"{note['kind']}: {note['text']}", markup=False)
+    for note in result.notes:
+        console.print(f"{note.kind}: {note.text}", markup=False)
 
 
-def print_limits(constraints: Iterable[JSON]) -> None:
+def print_limits(constraints: Iterable[ConstraintFigures]) -> None:
     """The tightest row of each kind of limit."""
-    tightest: dict[str, JSON] = {}
+    tightest: dict[str, ConstraintFigures] = {}
     for row in constraints:
-        family = row["name"].split("/", 1)[0]
+        family = row.name.split("/", 1)[0]
         known = tightest.get(family)
         if known is None or _rank(row) < _rank(known):
             tightest[family] = row
@@ -60,23 +60,23 @@ def print_limits(constraints: Iterable[JSON]) -> None:
         "Limit, where tightest", "Value", "", "Limit", "State", title="Limits", title_justify="left"
     )
     for row in tightest.values():
-        state = "broken" if not row["satisfied"] else "binds" if row["active"] else "holds"
+        state = "broken" if not row.satisfied else "binds" if row.active else "holds"
         table.add_row(
-            escape(row["name"]),
-            _number(row["value"], row["unit"]),
-            row["sense"],
-            _number(row["limit"]),
+            escape(row.name),
+            _number(row.value, row.unit),
+            row.sense,
+            _number(row.limit),
             state,
         )
     Console().print(table)
 
 
-def _rank(row: JSON) -> tuple[bool, bool, float]:
-    slack = row["slack"]
-    return row["satisfied"], not row["active"], slack if slack is not None else 0.0
+def _rank(row: ConstraintFigures) -> tuple[bool, bool, float]:
+    slack = row.slack
+    return row.satisfied, not row.active, slack if slack is not None else 0.0
 
 
-def print_conflicts(result: JSON) -> None:
+def print_conflicts(result: DesignResult) -> None:
     """Which limits contradict each other, and by how much each would have to give way."""
     table = Table(
         "Limit",
@@ -85,12 +85,12 @@ def print_conflicts(result: JSON) -> None:
         title="Limits in conflict",
         title_justify="left",
     )
-    for row in result["conflicts"]:
-        alone = row["give_alone"]
+    for row in result.conflicts:
+        alone = row.give_alone
         table.add_row(
-            escape(row["family"]),
-            _number(row["give"], row["unit"]),
-            "not enough" if alone is None else _number(alone, row["unit"]),
+            escape(row.family),
+            _number(row.give, row.unit),
+            "not enough" if alone is None else _number(alone, row.unit),
         )
     Console().print(table)
 

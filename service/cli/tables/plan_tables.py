@@ -2,75 +2,79 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-JSON = dict[str, Any]
+from service.kinds.plan import PlanPrice, PlanResult
 
 
-def print_plan(result: JSON) -> None:
+def _figure(value: float | None, digits: int) -> str:
+    return "-" if value is None else f"{value:.{digits}f}"
+
+
+def _loss(share: float | None) -> str:
+    return "-" if share is None else f"{100.0 * share:+.2f} %"
+
+
+def print_plan(result: PlanResult) -> None:
     """What is built, what it costs in accuracy, and how exact it must be."""
     console = Console(highlight=False)
     console.print(
-        f"{escape(result['system'])}: {result['members']} members "
-        f"({result['member_length_mm'] / 1000.0:.2f} m), {result['plates']} plates, "
-        f"{result['wedges']} printed wedges, {result['parts']} bought parts"
+        f"{escape(result.system)}: {result.members} members "
+        f"({result.member_length_mm / 1000.0:.2f} m), {result.plates} plates, "
+        f"{result.wedges} printed wedges, {result.parts} bought parts"
     )
-    _print_price(console, result["price"])
+    _print_price(console, result.price)
     _print_tolerances(console, result)
-    for clash in result["clashes"]:
+    for clash in result.clashes:
         console.print(
-            f"clash ({clash['kind']}): {clash['one']} - {clash['other']}, "
-            f"{clash['clearance_mm']:.1f} mm of {clash['required_mm']:.1f} mm",
+            f"clash ({clash.kind}): {clash.one} - {clash.other}, "
+            f"{_figure(clash.clearance_mm, 1)} mm of {_figure(clash.required_mm, 1)} mm",
             markup=False,
         )
-    for note in result["notes"]:
+    for note in result.notes:
         console.print(f"note: {note}", markup=False)
 
 
-def _print_price(console: Console, price: JSON) -> None:
+def _print_price(console: Console, price: PlanPrice) -> None:
     table = Table(
         *("", "Sigma, median mm", "2+ views", "3+ views", "Limits"),
         title="What building costs",
         title_justify="left",
     )
-    for name, label in (
-        ("designed", "as designed"),
-        ("rounded", "each setting rounded"),
-        ("built", "re-optimised: as built"),
+    for label, row in (
+        ("as designed", price.designed),
+        ("each setting rounded", price.rounded),
+        ("re-optimised: as built", price.built),
     ):
-        row = price[name]
         table.add_row(
             label,
-            f"{row['sigma_median_mm']:.5f}",
-            f"{100.0 * row['coverage_2_views']:.2f} %",
-            f"{100.0 * row['coverage_3_views']:.2f} %",
-            "kept" if row["feasible"] else ", ".join(map(escape, row["broken"][:3])),
+            _figure(row.sigma_median_mm, 5),
+            f"{100.0 * row.coverage_2_views:.2f} %",
+            f"{100.0 * row.coverage_3_views:.2f} %",
+            "kept" if row.feasible else ", ".join(map(escape, row.broken[:3])),
         )
     console.print(table)
     console.print(
-        f"loss of median sigma {100.0 * price['sigma_loss']:+.2f} %, of coverage "
-        f"{100.0 * price['coverage_loss']:+.2f} %"
+        f"loss of median sigma {_loss(price.sigma_loss)}, of coverage {_loss(price.coverage_loss)}"
     )
 
 
-def _print_tolerances(console: Console, result: JSON) -> None:
+def _print_tolerances(console: Console, result: PlanResult) -> None:
     table = Table(
         *("Setting", "Camera", "May be off by", "Then breaks"),
         title="Tightest settings",
         title_justify="left",
     )
-    for row in result["tightest"]:
-        least = [value for value in (row["plus"], row["minus"]) if value is not None]
-        off = f"{min(least):.2f} {row['unit']}" if least else "more than was tried"
-        table.add_row(escape(row["setting"]), escape(row["camera"]), off, escape(row["limit"]))
+    for row in result.tightest:
+        least = [value for value in (row.plus, row.minus) if value is not None]
+        off = f"{min(least):.2f} {row.unit}" if least else "more than was tried"
+        table.add_row(escape(row.setting), escape(row.camera), off, escape(row.limit))
     console.print(table)
-    share = result["yield_share"]
+    share = result.yield_share
     if share is not None:
         console.print(
-            f"{100.0 * share:.0f} % of {result['yield_trials']} rigs built with every setting off "
+            f"{100.0 * share:.0f} % of {result.yield_trials} rigs built with every setting off "
             "by up to half a step keep all limits"
         )

@@ -5,23 +5,24 @@ from __future__ import annotations
 import json
 import tempfile
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Any
 
 from calibration.detection.gates import Rejection
 from calibration.detection.pictures import DetectedPictures, TakenPicture, detect_pictures
 from calibration.detection.selftest import require_opencv
 from calibration.targets.kinds import TargetPlan
 from common.files.plain import plain
-from common.progress import CancelToken, Progress, ProgressCallback
+from common.progress import Progress
+from service.jobs.engine import Running, Task
+from service.kinds.base import RequestT, ResultT
+from service.kinds.detection import CameraPictures, Detection, RuleCount
 from service.pictures.archive import unpack
 from service.pictures.listing import Picture, pictures_in_folder, pictures_in_session
 
-JSON = dict[str, Any]
 DETECTING = 0.85
 """Share of the progress that goes to detection: the rest takes seconds."""
 
@@ -29,51 +30,42 @@ _WORTH_PROCESSES = 8
 """Fewer pictures are found in less time than processes take to start."""
 
 
-def see(
-    plan: TargetPlan,
-    request: Mapping[str, Any],
-    inputs: Mapping[str, Path],
-    folder: Path,
-    report: ProgressCallback,
-    cancel: CancelToken,
-) -> DetectedPictures:
+def see(plan: TargetPlan, task: Task[RequestT, ResultT], running: Running) -> DetectedPictures:
     """The targets of ``plan`` in the pictures that a task was given.
 
-    Those are an archive (input ``pictures``), or the ``session`` or ``pictures`` folder that the
-    request names. Writes ``detections.json`` into ``folder``.
+    Those are an archive (input ``pictures``), or the session or folder of pictures that its run
+    names. Writes ``detections.json`` into the task's folder.
     """
-    report(Progress("reading the pictures", 0.0))
+    running.report(Progress("reading the pictures", 0.0))
     require_opencv()
-    with tempfile.TemporaryDirectory(prefix="pictures-", dir=folder.parent) as temporary:
-        pictures = _pictures(request, inputs, Path(temporary))
+    with tempfile.TemporaryDirectory(prefix="pictures-", dir=task.folder.parent) as temporary:
+        pictures = _pictures(task, Path(temporary))
 
         def within(inner: Progress, /) -> None:
-            report(
+            running.report(
                 Progress("finding targets", DETECTING * inner.fraction, iteration=inner.iteration)
             )
 
-        with _executor(int(request["workers"]), len(pictures)) as executor:
+        with _executor(task.run.workers, len(pictures)) as executor:
             seen = detect_pictures(
                 [TakenPicture(p.camera, p.frame, p.path) for p in pictures],
                 plan,
                 progress=within,
-                cancel=cancel,
+                cancel=running.cancel,
                 executor=executor,
             )
     document = json.dumps(_document(seen), allow_nan=False) + "\n"
-    (folder / "detections.json").write_text(document, encoding="utf-8")
+    (task.folder / "detections.json").write_text(document, encoding="utf-8")
     return seen
 
 
-def _pictures(
-    request: Mapping[str, Any], inputs: Mapping[str, Path], temporary: Path
-) -> Sequence[Picture]:
-    if "pictures" in inputs:
-        unpack(inputs["pictures"], temporary)
+def _pictures(task: Task[RequestT, ResultT], temporary: Path) -> Sequence[Picture]:
+    if "pictures" in task.inputs:
+        unpack(task.inputs["pictures"], temporary)
         return pictures_in_folder(temporary)
-    if request.get("session"):
-        return pictures_in_session(Path(request["session"]), request.get("captures") or ())
-    return pictures_in_folder(Path(request["pictures"]))
+    if task.run.session is not None:
+        return pictures_in_session(Path(task.run.session), task.run.captures)
+    return pictures_in_folder(Path(task.run.pictures or ""))
 
 
 @contextmanager
@@ -85,22 +77,23 @@ def _executor(workers: int, pictures: int) -> Iterator[Executor | None]:
         yield executor
 
 
-def seen_figures(seen: DetectedPictures) -> JSON:
+def detection_of(seen: DetectedPictures) -> Detection:
     """What was found, in short."""
     rejected = Counter(r.rule.value for found in seen.detections for r in found.rejections)
-    cameras = {name: {"pictures": 0, "targets": count} for name, count in seen.counts().items()}
-    for picture in seen.pictures:
-        cameras[picture.camera]["pictures"] += 1
-    return {
-        "pictures": len(seen.pictures),
-        "frames": len(seen.observations.frames),
-        "targets": sum(len(found) for found in seen.detections),
-        "cameras": [{"name": name, **facts} for name, facts in cameras.items()],
-        "rejected": [{"rule": rule, "count": count} for rule, count in rejected.most_common()],
-    }
+    pictures = Counter(picture.camera for picture in seen.pictures)
+    return Detection(
+        pictures=len(seen.pictures),
+        frames=len(seen.observations.frames),
+        targets=sum(len(found) for found in seen.detections),
+        cameras=[
+            CameraPictures(name=name, pictures=pictures[name], targets=count)
+            for name, count in seen.counts().items()
+        ],
+        rejected=[RuleCount(rule=rule, count=count) for rule, count in rejected.most_common()],
+    )
 
 
-def _document(seen: DetectedPictures) -> JSON:
+def _document(seen: DetectedPictures) -> dict[str, object]:
     return {
         "schema": "rigwright.detections/1",
         "pictures": [
@@ -121,6 +114,5 @@ def _document(seen: DetectedPictures) -> JSON:
     }
 
 
-def _rejection(rejection: Rejection) -> JSON:
-    document: JSON = plain(rejection)
-    return document | {"rule": rejection.rule.value}
+def _rejection(rejection: Rejection) -> dict[str, object]:
+    return {**plain(rejection), "rule": rejection.rule.value}

@@ -10,51 +10,57 @@ from rig.acquisition.capture.results import CaptureResult
 from rig.acquisition.session.folder import Session
 from rig.acquisition.station.spec import Station
 from rig.acquisition.station.stationfile import read_station
-from service.rigs.desk import Books, RigDesk
-from service.rigs.orders import CAPTURE, RIG_KINDS, capture_document, session_name
+from service.ipc import error_fields
+from service.kinds.rigs import CAPTURE, RIG_TEST, CaptureRequest
+from service.stations.jobs import capture_outcome
+from service.stations.worker import StationWorker, WorkerContext
 from service.store import interrupted
 from service.store.jobrecords import JobRecord
 from service.store.tables import JobStatus
-from service.wire import error_fields
+
+STATION_KINDS = (CAPTURE.name, RIG_TEST.name)
+"""Names of the kinds of jobs that stations do."""
 
 
-class RigDesks:
-    """The desks by name. Raises :class:`InputError` when two stations have one name."""
+class StationRegistry:
+    """The workers by name. Raises :class:`InputError` when two stations have one name."""
 
-    def __init__(self, stations: Sequence[Station], sessions: Path, books: Books) -> None:
+    def __init__(self, stations: Sequence[Station], sessions: Path, context: WorkerContext) -> None:
         self.sessions = sessions
-        self._books = books
-        self._desks = {station.name: RigDesk(station, sessions, books) for station in stations}
-        if len(self._desks) < len(stations):
+        self._context = context
+        self._workers = {
+            station.name: StationWorker(station, sessions, context) for station in stations
+        }
+        if len(self._workers) < len(stations):
             raise InputError(
                 "station-twice", "two stations have one name", "give each station its own name"
             )
 
     def start(self) -> None:
         """Settle what a crash left, then open all stations."""
-        for job in self._books.store.jobs.running(RIG_KINDS):
+        for job in self._context.store.jobs.running(STATION_KINDS):
             self._settle(job)
-        for desk in self._desks.values():
-            desk.start()
+        for worker in self._workers.values():
+            worker.start()
 
     def stop(self) -> None:
         """Let go of all devices."""
-        for desk in self._desks.values():
-            desk.stop()
+        for worker in self._workers.values():
+            worker.stop()
 
-    def all(self) -> list[RigDesk]:
-        """The desks, as the settings list their stations."""
-        return list(self._desks.values())
+    def all(self) -> list[StationWorker]:
+        """The workers, as the settings list their stations."""
+        return list(self._workers.values())
 
-    def get(self, name: str) -> RigDesk:
-        """One desk. Raises :class:`NotFoundError`."""
-        if name not in self._desks:
+    def get(self, name: str) -> StationWorker:
+        """One worker. Raises :class:`NotFoundError`."""
+        if name not in self._workers:
             raise NotFoundError(
                 "rig",
                 f"there is no rig {name!r}",
                 "see /v1/rigs; a rig is a station file given to the service with --station",
             )
-        return self._desks[name]
+        return self._workers[name]
 
     def session_folder(self, name: str) -> Path:
         """Where a session lies. Raises :class:`NotFoundError` when there is none."""
@@ -72,9 +78,10 @@ class RigDesks:
 
     def _settle(self, job: JobRecord) -> None:
         """Write down how a job ended that ran when the service died: its session knows."""
-        jobs = self._books.store.jobs
+        jobs = self._context.store.jobs
         try:
-            result = self._committed(job) if job.kind == CAPTURE else None
+            request = _capture_request(job) if job.kind == CAPTURE.name else None
+            result = None if request is None else self._committed(request)
         except RigwrightError as error:
             jobs.end(job.id, JobStatus.INTERRUPTED, error_fields(error))
             return
@@ -82,14 +89,15 @@ class RigDesks:
             jobs.end(job.id, JobStatus.INTERRUPTED, error_fields(interrupted()))
         elif result.error is not None:
             jobs.end(job.id, JobStatus.FAILED, error_fields(result.error))
-        else:
-            jobs.complete(job.id, capture_document(result, session_name(job.request)), {})
+        elif request is not None:
+            outcome = capture_outcome(result, request.session_name)
+            jobs.complete(job.id, CAPTURE.result_row(outcome), {})
 
-    def _committed(self, job: JobRecord) -> CaptureResult | None:
-        folder = self.sessions / session_name(job.request)
+    def _committed(self, request: CaptureRequest) -> CaptureResult | None:
+        folder = self.sessions / request.session_name
         try:
             with Session.open(folder) as session:
-                record = session.committed(job.request["capture_id"])
+                record = session.committed(request.capture_id)
         except NotFoundError:
             return None
         except ConflictError as error:
@@ -102,3 +110,8 @@ class RigDesks:
 def read_stations(paths: Sequence[Path]) -> list[Station]:
     """The stations in files. Raises :class:`InputError` for one that makes no sense."""
     return [read_station(path) for path in paths]
+
+
+def _capture_request(job: JobRecord) -> CaptureRequest:
+    asked = {key: value for key, value in job.request.items() if key != "rig"}
+    return CaptureRequest.model_validate(asked)

@@ -12,23 +12,31 @@ from typing import Any
 
 from common.errors import ConflictError, DeviceError, InterlockError, InternalError, RigwrightError
 from common.files.plain import plain
-from common.progress import CancelToken, Progress, ProgressCallback
+from common.progress import Progress, ProgressCallback
 from rig.acquisition.capture.results import RigHealth
 from rig.acquisition.capture.rig import Rig
 from rig.acquisition.station.spec import Station
 from rig.acquisition.trigger.box import TriggerState
 from rig.devices.station import open_station
 from service import logs
-from service.jobs.bell import Bell
 from service.jobs.cancels import Cancels
+from service.jobs.engine import Running
 from service.jobs.manager import end_without_result
-from service.rigs.sessions import Sessions
+from service.jobs.notifier import Notifier
+from service.kinds.base import JobKind, Request, Result
+from service.kinds.rigs import RIG_TEST
+from service.stations.sessions import Sessions
 from service.store import Store
 from service.store.jobrecords import JobRecord, NewJob
 
-JSON = dict[str, Any]
-Work = Callable[[Rig, Sessions, ProgressCallback, CancelToken], JSON]
-"""What a job does with the open rig; returns its result."""
+
+@dataclass(frozen=True)
+class StationWork:
+    """A job that waits for its rig: its kind, and what it does with the open rig."""
+
+    kind: JobKind[Any, Any]
+    do: Callable[[Rig, Sessions, Running], Result]
+
 
 _REOPEN_S = 5.0
 """How often devices are looked for that were not there: somebody plugs them in sooner or later."""
@@ -37,27 +45,27 @@ _GONE = (TriggerState.DISCONNECTED, TriggerState.OPENING, TriggerState.PROBING)
 
 
 @dataclass(frozen=True)
-class Books:
-    """What a desk writes into: shared by all desks of a service."""
+class WorkerContext:
+    """What a worker writes into: shared by all workers of a service."""
 
     store: Store
-    bell: Bell
+    notifier: Notifier
     cancels: Cancels
 
 
-class RigDesk:
+class StationWorker:
     """A station, open as long as the service runs.
 
-    Jobs are begun by request threads and done by the desk's own thread; a second one meanwhile
+    Jobs are begun by request threads and done by the worker's own thread; a second one meanwhile
     is refused, because a capture that waits in a queue is not what its subject sat still for.
     """
 
-    def __init__(self, station: Station, sessions: Path, books: Books) -> None:
+    def __init__(self, station: Station, sessions: Path, context: WorkerContext) -> None:
         self.station = station
-        self._books = books
+        self._context = context
         self._sessions = Sessions(sessions)
         self._lock = threading.Lock()
-        self._orders: queue.SimpleQueue[tuple[JobRecord, Work] | None] = queue.SimpleQueue()
+        self._waiting: queue.SimpleQueue[tuple[JobRecord, StationWork] | None] = queue.SimpleQueue()
         self._rig: Rig | None = None
         self._problem: RigwrightError | None = None
         self._doing: JobRecord | None = None
@@ -77,8 +85,8 @@ class RigDesk:
         """End what is being done and let go of the devices."""
         with self._lock:
             self._stopping = True
-        self._books.cancels.stop_all()
-        self._orders.put(None)
+        self._context.cancels.stop_all()
+        self._waiting.put(None)
         if self._thread.is_alive():
             self._thread.join()
 
@@ -98,7 +106,7 @@ class RigDesk:
             if doing is not None:
                 # Whoever reads the job must see that somebody ended it.
                 with suppress(ConflictError):
-                    self._books.cancels.cancel(doing.id, doing.kind)
+                    self._context.cancels.cancel(doing.id, doing.kind)
 
     def reset(self) -> None:
         """Let the box leave its fault.
@@ -111,23 +119,24 @@ class RigDesk:
             raise self._not_open()
         rig.reset()
 
-    def begin(self, new: NewJob, job_id: str, work: Work) -> tuple[JobRecord, bool]:
+    def begin(self, request: Request, job_id: str, work: StationWork) -> tuple[JobRecord, bool]:
         """Begin a job, and whether it is new; the same request again gives the job there is.
 
         Raises :class:`ConflictError` ``rig-busy`` and ``id-used``, :class:`DeviceError` when box
         or cameras are not there, :class:`InterlockError` when the interlock is open.
         """
+        new = NewJob(work.kind.name, {"rig": self.name} | request.model_dump(mode="json"))
         with self._lock:
-            known = self._books.store.jobs.find(job_id)
+            known = self._context.store.jobs.find(job_id)
             if known is None:
-                self._require_ready(new.kind)
-            record, fresh = self._books.store.jobs.begin(new, job_id)
+                self._require_ready(work.kind)
+            record, fresh = self._context.store.jobs.begin(new, job_id)
             if fresh:
                 self._doing = record
-                self._orders.put((record, work))
+                self._waiting.put((record, work))
             return record, fresh
 
-    def _require_ready(self, kind: str) -> None:
+    def _require_ready(self, kind: JobKind[Any, Any]) -> None:
         if self._doing is not None and not self._over(self._doing):
             raise ConflictError(
                 "rig-busy",
@@ -137,7 +146,7 @@ class RigDesk:
         if self._rig is None or self._stopping:
             raise self._not_open()
         box = self._rig.health().box
-        if box is None or kind == "rig-test":
+        if box is None or kind is RIG_TEST:
             return
         if box.state in _GONE:
             raise DeviceError(
@@ -156,11 +165,11 @@ class RigDesk:
 
         Whoever reads it asks for the next at once, and must not be told that the rig is busy.
         """
-        return self._books.store.jobs.get(job.id).status.terminal
+        return self._context.store.jobs.get(job.id).status.terminal
 
     def _not_open(self) -> RigwrightError:
         # What stood in the way may be gone: ask the thread to try once more.
-        self._orders.put(None)
+        self._waiting.put(None)
         return self._problem or DeviceError(
             "rig-opening", f"rig {self.name!r} is being opened", "ask again in a few seconds"
         )
@@ -168,7 +177,7 @@ class RigDesk:
     def _serve(self) -> None:
         self._try_to_open()
         while True:
-            order = self._next_order()
+            order = self._next_job()
             if order is not None:
                 self._do(*order)
             elif self._stopping:
@@ -179,10 +188,10 @@ class RigDesk:
         if self._rig is not None:
             self._rig.close()
 
-    def _next_order(self) -> tuple[JobRecord, Work] | None:
+    def _next_job(self) -> tuple[JobRecord, StationWork] | None:
         """What is asked for next; None now and then while the rig is not open."""
         try:
-            return self._orders.get(timeout=_REOPEN_S if self._rig is None else None)
+            return self._waiting.get(timeout=_REOPEN_S if self._rig is None else None)
         except queue.Empty:
             return None
 
@@ -197,32 +206,33 @@ class RigDesk:
                 "rig not open", extra={"fields": {"rig": self.name, "why": str(error)}}
             )
 
-    def _do(self, job: JobRecord, work: Work) -> None:
+    def _do(self, job: JobRecord, work: StationWork) -> None:
         token = logs.job_id.set(job.id)
-        jobs = self._books.store.jobs
+        jobs = self._context.store.jobs
         try:
             if self._rig is None:
                 raise self._not_open()
-            with self._books.cancels.running(job.id) as cancel:
-                result = work(self._rig, self._sessions, self._reporter(job.id), cancel)
-            jobs.complete(job.id, plain(result), {})
+            with self._context.cancels.running(job.id) as cancel:
+                running = Running(self._reporter(job.id), cancel)
+                result = work.do(self._rig, self._sessions, running)
+            jobs.complete(job.id, work.kind.result_row(result), {})
         except RigwrightError as error:
-            end_without_result(self._books.store, job.id, error)
+            end_without_result(self._context.store, job.id, error)
         except Exception as error:  # noqa: BLE001 - the rig must go on being usable
             logs.log.exception("a job of a rig could not be done")
             fault = InternalError("rig-fault", f"a fault ({error!r})", "see the log")
-            end_without_result(self._books.store, job.id, fault)
+            end_without_result(self._context.store, job.id, fault)
         finally:
             with self._lock:
                 # The next may have been taken on since this one's end could be read.
                 if self._doing is job:
                     self._doing = None
-            self._books.bell.ring(job.id)
+            self._context.notifier.notify(job.id)
             logs.job_id.reset(token)
 
     def _reporter(self, job_id: str) -> ProgressCallback:
         def report(progress: Progress, /) -> None:
-            self._books.store.jobs.record_progress(job_id, plain(progress))
-            self._books.bell.ring(job_id)
+            self._context.store.jobs.record_progress(job_id, plain(progress))
+            self._context.notifier.notify(job_id)
 
         return report

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from calibration.targets.proposing import Proposal, propose_targets
 from common.errors import InputError
-from common.files.plain import plain
 from rig.design.designfile import read_design
+from service.kinds.targets import SeenByCamera
 
-JSON = dict[str, Any]
 HEAD_MM = (160.0, 200.0, 240.0)
 """Width, depth and height of what a face is a part of: targets stand round the whole head."""
 
@@ -38,7 +36,14 @@ def proposal_for(design: Path) -> Proposal:
     return propose_targets(read.cameras, centre, size, name=f"targets for {read.name}")
 
 
-def proposal_figures(proposal: Proposal) -> JSON:
-    """What each camera sees of a proposal, and what could not be had."""
-    figures: JSON = plain({"cameras": proposal.cameras, "notes": proposal.notes})
-    return figures
+def seen_by_cameras(proposal: Proposal) -> list[SeenByCamera]:
+    """What each camera sees of a proposal."""
+    return [
+        SeenByCamera(
+            camera=seen.camera,
+            targets=int(seen.targets),
+            cells=int(seen.cells),
+            radius_px=(float(seen.radius_px[0]), float(seen.radius_px[1])),
+        )
+        for seen in proposal.cameras
+    ]

@@ -21,6 +21,7 @@ from calibration.targets.kinds import (
 )
 from calibration.targets.printing import carrier_drawings, to_pdf, to_svg
 from common.errors import InputError
+from service.kinds.defaults import PAGE
 from service.store.scans import plain_name
 
 
@@ -34,7 +35,7 @@ class Sheet:
     make: Callable[[], bytes]
 
 
-def sheets_of(plan: TargetPlan, page: str = "A4") -> Mapping[str, Sheet]:
+def sheets_of(plan: TargetPlan, page: str = PAGE) -> Mapping[str, Sheet]:
     """By file name: a PDF of each carrier, an SVG of each of its pages, a picture if it is flat.
 
     Raises :class:`InputError` for a carrier that does not fit its page.

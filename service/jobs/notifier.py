@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 
-class Bell:
+class Notifier:
     """Rung from any thread, heard on the event loop."""
 
     def __init__(self) -> None:
@@ -21,7 +21,7 @@ class Bell:
         """Whether the service is stopping, so that streams must end."""
         return self._closed
 
-    def ring(self, job_id: str) -> None:
+    def notify(self, job_id: str) -> None:
         """Wake everyone who listens to a job."""
         with self._lock:
             listeners = list(self._listeners.get(job_id, ()))

@@ -1,0 +1,61 @@
+"""Designs: a scan and a rig's limits in, camera poses and a mount layout out."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field
+
+from rig.specification.rigfile import RigFile
+from rig.specification.spec import RigSpec
+from service.kinds.base import LARGEST_JSON_INTEGER, Figure, JobKind, Request, Result
+from service.kinds.evaluation import EvaluationResult
+
+
+class DesignRequest(Request):
+    """What to design. ``cameras``, ``seed`` and ``starts`` override those of the rig."""
+
+    rig: Annotated[RigFile, Field(description="The structure of a rig file, as JSON.")]
+    cameras: Annotated[
+        int | None, Field(ge=1, le=500, description="How many cameras to place.")
+    ] = None
+    seed: Annotated[int | None, Field(ge=0, le=LARGEST_JSON_INTEGER)] = None
+    starts: Annotated[int | None, Field(ge=1, le=1000, description="Starts to try.")] = None
+
+    def spec(self) -> RigSpec:
+        """The rig with what is asked for instead. Raises :class:`InputError`."""
+        given = {"cameras": self.cameras, "seed": self.seed, "starts": self.starts}
+        changed = {name: value for name, value in given.items() if value is not None}
+        return self.rig.model_copy(update=changed).to_spec()
+
+
+class DemoRequest(Request):
+    """The example rig, for the bundled head."""
+
+
+class Conflict(Result):
+    """A limit that takes part in a contradiction, and by how much it would have to give way."""
+
+    family: str
+    unit: str
+    give: Figure
+    give_alone: Annotated[
+        Figure, Field(description="If it alone gave way; null when that is not enough.")
+    ]
+
+
+class DesignResult(EvaluationResult):
+    """The figures of a design. When the limits contradict each other it is the nearest one."""
+
+    name: str
+    seed: int
+    status: str
+    why_stopped: str
+    start_cost_mm2: Figure
+    conflicts: list[Conflict]
+    collisions: int
+    seconds: float
+
+
+DESIGN = JobKind("design", DesignRequest, DesignResult)
+DEMO = JobKind("demo", DemoRequest, DesignResult)

@@ -1,0 +1,52 @@
+"""Evaluations: given cameras, scored with the figures of a design."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field
+
+from rig.design.designmodel import DesignFile
+from rig.specification.rigfile import RigFile
+from service.kinds.base import Figure, JobKind, Note, Request, Result
+
+
+class EvaluationRequest(Request):
+    """What to score: the cameras of ``design`` against the limits of ``rig``."""
+
+    rig: Annotated[RigFile, Field(description="The structure of a rig file, as JSON.")]
+    design: Annotated[
+        DesignFile,
+        Field(
+            description="A design document; of an existing rig `schema` and `cameras` are enough."
+        ),
+    ]
+
+
+class Coverage(Result):
+    """Share of the region's points seen by ``views`` cameras or more."""
+
+    views: int
+    share: float
+
+
+class EvaluationResult(Result):
+    """The figures of given cameras."""
+
+    feasible: Annotated[bool, Field(description="Whether every limit is satisfied.")]
+    cameras: int
+    cost_mm2: Figure
+    sigma_median_mm: Figure
+    sigma_p95_mm: Figure
+    sigma_max_mm: Figure
+    coverage: list[Coverage]
+    in_focus_share: Figure
+    in_frame_share: Figure
+    violated: Annotated[list[str], Field(description="Names of the limits that are broken.")]
+    notes: Annotated[
+        list[Note],
+        Field(description="What was inferred or changed to read the scan and find the face."),
+    ]
+
+
+EVALUATION = JobKind("evaluation", EvaluationRequest, EvaluationResult)

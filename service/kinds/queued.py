@@ -1,0 +1,18 @@
+"""The kinds of jobs that wait in the service's queue."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from service.kinds.acceptance import ACCEPTANCE
+from service.kinds.base import JobKind
+from service.kinds.calibration import CALIBRATION
+from service.kinds.check import CHECK
+from service.kinds.design import DESIGN
+from service.kinds.evaluation import EVALUATION
+from service.kinds.plan import PLAN
+
+_ALL: tuple[JobKind[Any, Any], ...] = (DESIGN, EVALUATION, PLAN, CALIBRATION, CHECK, ACCEPTANCE)
+QUEUED: Mapping[str, JobKind[Any, Any]] = {kind.name: kind for kind in _ALL}
+"""By name."""

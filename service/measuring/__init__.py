@@ -1,1 +1,0 @@
-"""From pictures of targets to calibrations, checks and acceptance tests, with their files."""
