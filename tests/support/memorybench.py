@@ -33,6 +33,7 @@ class BenchMaker:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.made: list[Bench] = []
+        self.count = 0
 
     def __call__(
         self,
@@ -44,7 +45,8 @@ class BenchMaker:
         devices = MemoryDevices(scripts or {}, MemoryBox(box or BoxScript()))
         station = memory_station() if station is None else station
         rig = Rig(station, devices, locks=self.folder / "locks", fit=line_fit)
-        place = self.folder / f"session{len(self.made)}"
+        self.count += 1
+        place = self.folder / f"session{self.count}"
         bench = Bench(rig, devices, rig.new_session(place, "me", disk=disk))
         self.made.append(bench)
         return bench

@@ -163,3 +163,5 @@ def test_random_failures_never_make_a_record_untrue(bench: BenchMaker, kind: Cam
             dies_at=lots.choice((None, None, lots.randint(1, shots))),
         )
         taken(bench, bad, kind, shots)
+        bench.close()
+        bench.made.clear()
