@@ -68,9 +68,10 @@ def staggered(seed: int) -> Burst:
     instants = sorted(draw.sample(range(0, INTERVAL_TICKS - 2400, 4), 32))
     draw.shuffle(instants)
     pairs = zip(instants[::2], instants[1::2], strict=True)
-    pulses = {
-        output: (min(pair), abs(pair[0] - pair[1])) for output, pair in zip(ALL, pairs, strict=True)
-    }
+    spans = [(min(pair), abs(pair[0] - pair[1])) for pair in pairs]
+    # The strobes, whose rest and duty are limited, get the two shortest.
+    spans.sort(key=lambda span: span[1])
+    pulses = dict(zip([13, 14, *(o for o in ALL if o not in (13, 14))], spans, strict=True))
     return Burst(pulses, shots=SHOTS, interval=INTERVAL_TICKS)
 
 

@@ -9,7 +9,7 @@
 #ifndef BOARD_H
 #define BOARD_H
 
-#define FIRMWARE_VERSION "1.0.0"
+#define FIRMWARE_VERSION "1.1.0"
 
 #define OUTPUTS 16
 #define FIRST_STROBE 13
@@ -41,7 +41,17 @@
 #define MIN_GAP 4
 #define MIN_LEAD 2000UL
 #define MIN_REST 2000UL /* from a shot's last edge to the next shot's start */
-#define SILENCE_TICKS (3000UL * TICKS_PER_MS)
+#define SILENCE_MS 3000UL
+
+/* While it fires: how long it goes on without a sign of life of the host. */
+#define DEAD_MAN_MS 3000
+#define MIN_DEAD_MAN_MS 500
+#define MAX_DEAD_MAN_MS 30000
+
+/* Of a strobe: least time from the end of a pulse to the next one's begin, and the largest part of
+ * the time for which it may be on, as one in so many. */
+#define STROBE_REST 8000UL /* 4 ms */
+#define STROBE_DUTY 4
 
 #define CAPTURE_ID_SIZE 12
 #define NAME_SIZE 16

@@ -3,6 +3,7 @@
 #include <avr/io.h>
 #include <avr/wdt.h>
 #include <stdbool.h>
+#include <util/crc16.h>
 
 #include "board.h"
 
@@ -12,7 +13,10 @@
 static uint8_t flags __attribute__((section(".noinit")));
 static uint8_t bootloader_flags __attribute__((section(".noinit")));
 static uint16_t powered __attribute__((section(".noinit")));
+static uint16_t id __attribute__((section(".noinit")));
 static uint8_t cause;
+
+extern const uint8_t __heap_start; /* the linker's: where RAM begins that the program does not use */
 
 /* Before the C runtime clears its memory, which takes a millisecond in which a pin might float.
  * The watchdog is set here too: after a watchdog reset it runs on at 15 ms. */
@@ -31,6 +35,16 @@ void boot_first(void)
     wdt_enable(WDTO_250MS);
 }
 
+/* Unused RAM comes up in a pattern that differs from chip to chip and, in part, from start to start.
+ * After a reset that keeps it, what the last start has left there and its id make the new one. */
+static void make_id(void)
+{
+    for (const uint8_t *byte = &__heap_start; byte < (const uint8_t *)SP; byte++) {
+        id = _crc_xmodem_update(id, *byte);
+    }
+    id++; /* of RAM full of zeros too */
+}
+
 /* A bootloader clears the flags before us. Optiboot from version 5 on hands them on in r2; older
  * ones lose them, and then RAM that still holds its mark tells a reset from a power-up. */
 void boot_start(void)
@@ -41,6 +55,7 @@ void boot_start(void)
         known = bootloader_flags;
     }
     powered = POWERED;
+    make_id();
     if (known & _BV(PORF)) {
         cause = CAUSE_POWER;
     } else if (known & _BV(WDRF)) {
@@ -57,6 +72,11 @@ void boot_start(void)
 enum cause boot_cause(void)
 {
     return cause;
+}
+
+uint16_t boot_id(void)
+{
+    return id;
 }
 
 PGM_P cause_name(uint8_t of)

@@ -12,6 +12,9 @@ void boot_start(void);
 
 enum cause boot_cause(void);
 
+/* A number of this start, of which no two starts or boxes are likely to have the same. */
+uint16_t boot_id(void);
+
 PGM_P cause_name(uint8_t cause);
 
 #endif

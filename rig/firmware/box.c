@@ -21,6 +21,9 @@ static uint32_t armed_at;
 static uint32_t heard_at;
 static uint8_t told_shots; /* DONE events so far */
 static bool telling;       /* events of a burst are still to come */
+static uint32_t strobe_rest;  /* ticks, after the pulses that are armed or were fired last */
+static uint32_t strobe_ready; /* when a strobe may be on again, if it rests */
+static bool strobe_rests;
 
 enum state box_state(void)
 {
@@ -88,6 +91,50 @@ static void tell_rest(void)
     }
 }
 
+static uint32_t largest(uint32_t a, uint32_t b)
+{
+    return a > b ? a : b;
+}
+
+/* What the strobes of a mask ask for: `rest` after their pulses, `least` from shot to shot; and
+ * the `first` of them begins so long after the shot. */
+struct strobe_needs {
+    uint32_t rest;
+    uint32_t least;
+    uint32_t first;
+};
+
+static struct strobe_needs strobe_needs(uint16_t mask)
+{
+    struct strobe_needs needs = {0, 0, UINT32_MAX};
+    for (uint8_t i = FIRST_STROBE - 1; i < LAST_STROBE; i++) {
+        const struct output *output = &outputs[i];
+        if (!(mask & ((uint16_t)1 << i)) || !output->width) {
+            continue;
+        }
+        uint32_t rest = largest(STROBE_REST, output->width * (STROBE_DUTY - 1));
+        needs.rest = largest(needs.rest, rest);
+        needs.least = largest(needs.least, output->width + rest);
+        if (output->delay < needs.first) {
+            needs.first = output->delay;
+        }
+    }
+    return needs;
+}
+
+/* FIRE comes after this, so what is too soon now may not be then; it is asked again. */
+static bool too_soon(const struct strobe_needs *needs, uint32_t lead)
+{
+    return needs->rest && strobe_rests &&
+           (int32_t)(strobe_ready - (clock_ticks() + lead + needs->first)) > 0;
+}
+
+uint16_t box_rest_ms(void)
+{
+    int32_t left = (int32_t)(strobe_ready - clock_ticks());
+    return left > 0 ? (uint16_t)(left / TICKS_PER_MS) + 1 : 0;
+}
+
 enum error box_arm(const struct arming *arming)
 {
     enum error error = box_not_idle();
@@ -105,14 +152,21 @@ enum error box_arm(const struct arming *arming)
         current = NULL; /* its edges are gone */
         return error;
     }
-    uint32_t least = arming->shots > 1 ? edges[edges_count - 1].at + MIN_REST : 0;
+    struct strobe_needs strobes = strobe_needs(arming->mask);
+    uint32_t least =
+        arming->shots > 1 ? largest(edges[edges_count - 1].at + MIN_REST, strobes.least) : 0;
     uint32_t most = arming->shots > 1 ? MAX_INTERVAL : 0;
     if (arming->interval < least || arming->interval > most) {
         current = NULL;
         return E_RANGE;
     }
+    if (too_soon(&strobes, arming->lead)) {
+        current = NULL;
+        return E_REST;
+    }
     tell_rest();
     armed = *arming;
+    strobe_rest = strobes.rest;
     current = results_add(arming->cap, arming->shots, store_boot());
     armed_at = clock_ticks();
     status_led(1);
@@ -121,16 +175,31 @@ enum error box_arm(const struct arming *arming)
     return E_NONE;
 }
 
+/* The burst is over, or has been stopped. */
+static void burst_ended(void)
+{
+    strobe_ready = clock_ticks() + strobe_rest;
+    strobe_rests = strobe_rest != 0;
+}
+
+/* End what is armed or firing before its time. */
+static void end(enum why why)
+{
+    if (state == STATE_FIRING) {
+        burst_ended();
+    }
+    result_end(current, state == STATE_FIRING ? PHASE_PARTIAL : PHASE_NOT_FIRED, why);
+    telling = false;
+    state = STATE_IDLE;
+}
+
 static void fault(uint8_t why)
 {
     struct result *struck = NULL;
     burst_stop();
-    if (state == STATE_FIRING) {
+    if (state == STATE_ARMED || state == STATE_FIRING) {
         struck = current;
-        struck->phase = PHASE_PARTIAL;
-    } else if (state == STATE_ARMED) {
-        struck = current;
-        struck->phase = PHASE_NOT_FIRED;
+        end(why);
     }
     telling = false;
     state = STATE_FAULT;
@@ -157,22 +226,17 @@ enum error box_fire(struct instant *start)
     return E_NONE;
 }
 
-static void disarm(enum event_kind kind, uint8_t detail)
-{
-    current->phase = PHASE_NOT_FIRED;
-    state = STATE_IDLE;
-    events_add(kind, current, detail);
-}
-
 void box_disarm(void)
 {
-    disarm(EVENT_DISARMED, 0);
+    end(WHY_DISARM);
+    events_add(EVENT_DISARMED, current, 0);
 }
 
 /* A burst whose last edge is made was not aborted, however soon after it the order comes. */
 static void finish(void)
 {
     if (state == STATE_FIRING && current->phase == PHASE_FIRED) {
+        burst_ended();
         state = STATE_IDLE;
     }
 }
@@ -181,12 +245,8 @@ void box_abort(void)
 {
     burst_stop();
     finish();
-    if (state == STATE_ARMED) {
-        disarm(EVENT_ABORTED, 0);
-    } else if (state == STATE_FIRING) {
-        current->phase = PHASE_PARTIAL;
-        telling = false;
-        state = STATE_IDLE;
+    if (state == STATE_ARMED || state == STATE_FIRING) {
+        end(WHY_ABORT);
         events_add(EVENT_ABORTED, current, current->shots);
     }
 }
@@ -200,9 +260,9 @@ void box_reset(void)
     }
 }
 
-void box_heard(void)
+void box_heard(uint32_t tick)
 {
-    heard_at = clock_ticks();
+    heard_at = tick;
 }
 
 /* One event at a time: each takes 6 ms of the line, and requests come first. */
@@ -219,13 +279,29 @@ static void tell(void)
     }
 }
 
+/* Whether no sign of life has come for as long as the state allows. */
+static bool silent(uint32_t now)
+{
+    uint32_t allowed_ms = state == STATE_FIRING ? armed.dead_man_ms : SILENCE_MS;
+    return allowed_ms && now - heard_at >= allowed_ms * TICKS_PER_MS;
+}
+
 static void expire(void)
 {
     uint32_t now = clock_ticks();
-    if (now - armed_at >= armed.hold_ms * TICKS_PER_MS) {
-        disarm(EVENT_EXPIRED, WHY_TTL);
-    } else if (now - heard_at >= SILENCE_TICKS) {
-        disarm(EVENT_EXPIRED, WHY_SILENCE);
+    enum why why = WHY_NONE;
+    if (state == STATE_ARMED && now - armed_at >= armed.hold_ms * TICKS_PER_MS) {
+        why = WHY_TTL;
+    } else if (silent(now)) {
+        why = WHY_SILENCE;
+    }
+    if (why) {
+        burst_stop();
+        finish();
+    }
+    if (why && state != STATE_IDLE) {
+        end(why);
+        events_add(EVENT_EXPIRED, current, why);
     }
 }
 
@@ -258,8 +334,11 @@ void box_poll(void)
     if (supervisor_overtime(current ? current->shots : 0)) {
         fault(WHY_OVERTIME);
     }
-    if (state == STATE_ARMED) {
+    if (state == STATE_ARMED || state == STATE_FIRING) {
         expire();
+    }
+    if (strobe_rests && (int32_t)(clock_ticks() - strobe_ready) >= 0) {
+        strobe_rests = false;
     }
     tell();
     show();

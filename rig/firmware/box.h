@@ -19,6 +19,7 @@ struct arming {
     uint32_t interval;
     uint32_t lead;
     uint32_t hold_ms;
+    uint16_t dead_man_ms; /* 0: it fires to the end, whoever is there */
 };
 
 enum state box_state(void);
@@ -49,8 +50,11 @@ void box_disarm(void);
 void box_abort(void);
 void box_reset(void);
 
-/* A line that can be read has come. */
-void box_heard(void);
+/* A request has come whole, its end at a tick: the host is alive. */
+void box_heard(uint32_t tick);
+
+/* Why not so soon: milliseconds for which a strobe must rest still. */
+uint16_t box_rest_ms(void);
 
 /* Do what time and pins ask for; call often. */
 void box_poll(void);

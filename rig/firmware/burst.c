@@ -1,10 +1,12 @@
 #include "burst.h"
 
 #include <avr/interrupt.h>
+#include <stddef.h>
 #include <util/atomic.h>
 
 #include "board.h"
 #include "edges.h"
+#include "interlock.h"
 #include "ports.h"
 #include "uart.h"
 
@@ -21,8 +23,12 @@
 #define LATE_NEEDS (SYNC_NEEDS + 6)
 
 /* Bytes are taken from the serial line while waiting, up to this before the edge: taking a line
- * end costs up to 16 ticks. */
-#define BUSY (SYNC_NEEDS + 16)
+ * end costs up to 16 ticks, and a look at the interlock 2. */
+#define BUSY (SYNC_NEEDS + 18)
+
+/* The interlock is looked at up to this before the edge: telling an open one from a glitch takes 9
+ * ticks. */
+#define WATCHFUL (SYNC_NEEDS + 10)
 
 struct edge *player_sync(struct edge *first, uint8_t tick);
 
@@ -47,18 +53,24 @@ static inline uint8_t saturate(uint32_t ticks)
     return ticks > UINT8_MAX ? UINT8_MAX : (uint8_t)ticks;
 }
 
-/* Play the run that begins with an edge `left` ticks from now; its last edge. An edge whose time
+/* Play the run that begins with an edge `left` ticks from now; its last edge, or NULL when the
+ * interlock is open. An edge whose time
  * has gone, or is too near, comes as soon as it can be synchronised, and its run keeps its
  * distances: a run is late as a whole, by so many ticks exactly. */
 static inline __attribute__((always_inline)) struct edge *play(struct edge *first, uint32_t due,
                                                                int32_t left)
 {
+    if (interlock_reads_open() && interlock_open_now()) {
+        return NULL;
+    }
     uint16_t target = (uint16_t)due;
     int16_t wait = (int16_t)(target - TCNT1);
     uint8_t late = 0;
-    while (left >= 0 && wait > BUSY) {
-        if (UCSR0A & _BV(RXC0)) {
+    while (left >= 0 && wait > WATCHFUL) {
+        if (wait > BUSY && (UCSR0A & _BV(RXC0))) {
             uart_receive_locked();
+        } else if (interlock_reads_open() && interlock_open_now()) {
+            return NULL;
         }
         wait = (int16_t)(target - TCNT1);
     }
@@ -94,6 +106,27 @@ static inline bool shot_complete(void)
     return true;
 }
 
+static inline __attribute__((always_inline)) void stop_locked(void)
+{
+    TIMSK1 &= (uint8_t)~_BV(OCIE1A);
+    ports_low();
+}
+
+/* The main loop may be waiting for the serial line: whoever sees the interlock open stops the
+ * pulses itself. */
+static inline __attribute__((always_inline)) void interlock_stop(void)
+{
+    stop_locked();
+    interlock_opened = true;
+}
+
+ISR(PCINT0_vect)
+{
+    if (interlock_open_now()) {
+        interlock_stop();
+    }
+}
+
 ISR(TIMER1_COMPA_vect)
 {
     struct edge *edge = next;
@@ -104,8 +137,12 @@ ISR(TIMER1_COMPA_vect)
             schedule(due);
             break;
         }
-        edge = play(edge, due, left) + 1;
-        if (edge == &edges[edges_count]) {
+        edge = play(edge, due, left);
+        if (!edge) {
+            interlock_stop();
+            break;
+        }
+        if (++edge == &edges[edges_count]) {
             edge = edges;
             if (shot_complete()) {
                 break;
@@ -137,14 +174,8 @@ void burst_stop(void)
 {
     ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
     {
-        TIMSK1 &= (uint8_t)~_BV(OCIE1A);
-        ports_low();
+        stop_locked();
     }
-}
-
-bool burst_running(void)
-{
-    return TIMSK1 & _BV(OCIE1A);
 }
 
 uint8_t burst_side(void)

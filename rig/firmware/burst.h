@@ -2,7 +2,6 @@
 #ifndef BURST_H
 #define BURST_H
 
-#include <stdbool.h>
 #include <stdint.h>
 
 #include "clock.h"
@@ -17,9 +16,6 @@ struct instant burst_start(struct result *result, uint32_t lead, uint32_t interv
 
 /* Stop now, all outputs low. May be called when nothing runs, also from an interrupt. */
 void burst_stop(void);
-
-/* Whether edges are still to come. */
-bool burst_running(void);
 
 /* Which side of struct edge's `late` holds the last complete shot. */
 uint8_t burst_side(void);

@@ -32,6 +32,9 @@ static void reply_state_error(enum error error)
     } else if (error == E_FAULT) {
         say_text(PSTR(" why="));
         say_text(why_name(box_fault_why()));
+    } else if (error == E_REST) {
+        say_text(PSTR(" ms="));
+        say_number(box_rest_ms());
     }
 }
 
@@ -78,6 +81,15 @@ static void out(const struct request *request)
     say_number(output.width);
 }
 
+/* The dead man's time; what is left out is the default, and 0 none. */
+static enum error read_dead_man(const char *text, uint16_t *ms)
+{
+    uint32_t value = DEAD_MAN_MS;
+    enum error error = text ? value_number(text, 0, MAX_DEAD_MAN_MS, &value) : E_NONE;
+    *ms = (uint16_t)value;
+    return !error && value && value < MIN_DEAD_MAN_MS ? E_RANGE : error;
+}
+
 static struct verdict read_arming(const char *const *values, struct arming *arming)
 {
     uint32_t shots = 0;
@@ -88,6 +100,7 @@ static struct verdict read_arming(const char *const *values, struct arming *armi
     judge(&verdict, 3, value_number(values[3], 0, UINT32_MAX, &arming->interval));
     judge(&verdict, 4, value_number(values[4], MIN_LEAD, MAX_DELAY, &arming->lead));
     judge(&verdict, 5, value_number(values[5], 1, MAX_HOLD_MS, &arming->hold_ms));
+    judge(&verdict, 6, read_dead_man(values[6], &arming->dead_man_ms));
     arming->shots = (uint8_t)shots;
     return verdict;
 }

@@ -43,11 +43,15 @@ void command_line(void)
         refuse(NULL, E_CHECKSUM);
         return;
     }
-    box_heard();
     enum error error = request_parse(&request, check);
     if (error) {
         refuse(&request, error);
         return;
+    }
+    /* Only a checked request proves that a host is there. Noise does not, and neither does the
+     * box's own voice on a line that echoes. */
+    if (check == CHECK_GOOD) {
+        box_heard(line.tick);
     }
     reply_to(&request);
     if (request_is_query(request.command)) {

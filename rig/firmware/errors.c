@@ -31,6 +31,7 @@ static const struct entry table[] PROGMEM = {
     [E_ARMED] = {222, "armed"},
     [E_USED] = {223, "used"},
     [E_BUSY] = {230, "busy"},
+    [E_REST] = {231, "rest"},
     [E_FAULT] = {240, "fault"},
     [E_UNKNOWN] = {250, "unknown"},
     [E_NOTHING] = {260, "nothing"},

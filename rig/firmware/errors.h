@@ -24,6 +24,7 @@ enum error {
     E_ARMED,
     E_USED,
     E_BUSY,
+    E_REST,
     E_FAULT,
     E_UNKNOWN,
     E_NOTHING,

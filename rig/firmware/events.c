@@ -24,20 +24,6 @@ static uint8_t kept;
 static uint8_t unsent;
 static uint8_t position; /* where the next one goes */
 
-PGM_P why_name(uint8_t why)
-{
-    switch (why) {
-    case WHY_TTL:
-        return PSTR("ttl");
-    case WHY_SILENCE:
-        return PSTR("silence");
-    case WHY_INTERLOCK:
-        return PSTR("interlock");
-    default:
-        return PSTR("overtime");
-    }
-}
-
 static PGM_P kind_name(uint8_t kind)
 {
     switch (kind) {
@@ -98,11 +84,12 @@ void events_add_done(const struct result *result, uint8_t shot, struct instant s
     memcpy(event->cap, result->cap, CAPTURE_ID_SIZE);
 }
 
-void events_add_boot(uint32_t boot, uint8_t cause)
+void events_add_boot(uint32_t boot, uint16_t id, uint8_t cause)
 {
     struct event *event = add(EVENT_BOOT);
     event->detail = cause;
     event->start.low = boot;
+    event->start.high = id;
 }
 
 static void say_start(const struct event *event)
@@ -134,6 +121,8 @@ static void say_fields(const struct event *event)
         say_number(event->start.low);
         say_text(PSTR(" cause="));
         say_text(cause_name(event->detail));
+        say_text(PSTR(" id="));
+        say_hex(event->start.high);
         break;
     case EVENT_DONE:
         say_done(event);

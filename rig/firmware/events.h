@@ -21,19 +21,14 @@ enum event_kind {
     EVENT_INTERLOCK,
 };
 
-/* Words that several lines use. */
-enum why { WHY_TTL, WHY_SILENCE, WHY_INTERLOCK, WHY_OVERTIME };
-
-PGM_P why_name(uint8_t why);
-
 /* Note an event. Of `result` the name is taken, and what belongs to the kind. */
 void events_add(enum event_kind kind, const struct result *result, uint8_t detail);
 
 /* As above for DONE, of the shot before last counted from 1. */
 void events_add_done(const struct result *result, uint8_t shot, struct instant start, uint8_t late);
 
-/* BOOT, whose count does not fit elsewhere. */
-void events_add_boot(uint32_t boot, uint8_t cause);
+/* BOOT, whose count and id do not fit elsewhere. */
+void events_add_boot(uint32_t boot, uint16_t id, uint8_t cause);
 
 /* Send the oldest event not sent yet; whether there was one. */
 bool events_send(void);

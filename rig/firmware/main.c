@@ -40,7 +40,7 @@ int main(void)
     set_sleep_mode(SLEEP_MODE_IDLE);
     sei();
     uart_put('\n'); /* ends the line that the reset may have cut */
-    events_add_boot(store_boot(), boot_cause());
+    events_add_boot(store_boot(), boot_id(), boot_cause());
     for (;;) {
         wdt_reset();
         box_poll();

@@ -3,22 +3,29 @@
 ; struct edge *player_sync(struct edge *first, uint8_t tick)
 ;     Waits for TCNT1L == tick, then plays so that the first OUT falls on the first cycle of the
 ;     tick SYNC_TICKS later. Interrupts must be off and the tick not have begun.
-;     Returns the last edge of the run.
+;     Returns the last edge of the run; NULL when the interlock has opened: no edge after that.
 ;
 ; Reading the counter in a loop finds the begin of a tick only to within the loop's 5 cycles. The
 ; four readings after it fall 8 cycles apart, at the begin of a tick for whoever is last in those
 ; 5; whoever is earlier reads the old value and is put back by one cycle. After four readings all
 ; are at the same cycle, whatever interrupt or sleep they came from.
+;
+; Between the edges of a run the interlock is read at every turn. OPEN_READINGS in a row that say
+; open are 4 us and no glitch.
 
 #include <avr/io.h>
 
+#include "board.h"
 #include "edge_layout.h"
+
+#define OPEN_READINGS 9
 
 .text
 .global player_sync
 
 player_sync:
     movw r30, r24
+    ldi  r24, OPEN_READINGS + 1
     ldd  r18, Z + EDGE_B
     ldd  r19, Z + EDGE_C
     ldd  r20, Z + EDGE_D
@@ -49,12 +56,12 @@ next:                           ;      6 cycles since the first OUT
     ldd  r20, Z + EDGE_D        ; 2
     mov  r22, r21               ; 1
     ldd  r21, Z + EDGE_WAIT     ; 2    17 cycles
-2:  nop                         ;      8 cycles a turn, 7 in the last
-    nop
-    nop
-    nop
-    nop
-    dec  r22
+2:  sbis _SFR_IO_ADDR(PINB), INTERLOCK_BIT ; 8 cycles a turn, 7 in the last
+    ldi  r24, OPEN_READINGS + 1 ; 2    both, or past it
+    dec  r24                    ; 1
+    breq open                   ; 1
+    nop                         ; 1
+    dec  r22                    ; 1
     brne 2b                     ;      2 ticks and one for each turn
 play:
     out  _SFR_IO_ADDR(PORTB), r18
@@ -63,4 +70,9 @@ play:
     tst  r21                    ; 1
     brne next                   ; 2
     movw r24, r30
+    ret
+
+open:
+    ldi  r24, 0
+    ldi  r25, 0
     ret

@@ -48,6 +48,17 @@ static void cap(void)
     say_limit(PSTR(" hold="), MAX_HOLD_MS);
 }
 
+static void safe(void)
+{
+    reply_ok();
+    say_limit(PSTR(" dm="), DEAD_MAN_MS);
+    say_limit(PSTR(" dmmin="), MIN_DEAD_MAN_MS);
+    say_limit(PSTR(" dmmax="), MAX_DEAD_MAN_MS);
+    say_limit(PSTR(" silence="), SILENCE_MS);
+    say_limit(PSTR(" srest="), STROBE_REST);
+    say_limit(PSTR(" sduty="), 100 / STROBE_DUTY);
+}
+
 static void boot(void)
 {
     reply_ok();
@@ -55,6 +66,8 @@ static void boot(void)
     say_number(store_boot());
     say_text(PSTR(" cause="));
     say_text(cause_name(boot_cause()));
+    say_text(PSTR(" id="));
+    say_hex(boot_id());
 }
 
 static void stat(void)
@@ -156,6 +169,10 @@ static void res(const struct request *request)
     say_number(result->late);
     say_text(PSTR(" boot="));
     say_number(result->boot);
+    if (result->why) {
+        say_text(PSTR(" why="));
+        say_text(why_name(result->why));
+    }
 }
 
 /* Find the capture, which must be the last one, and read the index, from 0 to below `end`. */
@@ -223,6 +240,9 @@ void command_query(const struct request *request)
         break;
     case C_CAP:
         cap();
+        break;
+    case C_SAFE:
+        safe();
         break;
     case C_BOOT:
         boot();

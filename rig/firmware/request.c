@@ -8,12 +8,13 @@
 
 struct entry {
     char name[10];
-    char arguments[24]; /* names, a space between */
+    char arguments[27]; /* names, a space between */
 };
 
 static const struct entry table[COMMANDS] PROGMEM = {
     [C_IDN] = {"*IDN?", ""},
     [C_CAP] = {"CAP?", ""},
+    [C_SAFE] = {"SAFE?", ""},
     [C_BOOT] = {"BOOT?", ""},
     [C_STAT] = {"STAT?", ""},
     [C_TIME] = {"TIME?", "pad"},
@@ -23,7 +24,7 @@ static const struct entry table[COMMANDS] PROGMEM = {
     [C_EDGE] = {"EDGE?", "cap i"},
     [C_SHOT] = {"SHOT?", "cap k"},
     [C_OUT] = {"OUT", "ch d w"},
-    [C_ARM] = {"ARM", "cap mask n iv lead ttl"},
+    [C_ARM] = {"ARM", "cap mask n iv lead ttl dm"},
     [C_FIRE] = {"FIRE", "cap"},
     [C_DISARM] = {"DISARM", "cap"},
     [C_ABORT] = {"ABORT", ""},
@@ -118,6 +119,7 @@ static enum error take_argument(struct request *request, const char *word)
     return E_NONE;
 }
 
+/* Those that must be there: the dead man's time may be left out, and hosts of old do. */
 static uint8_t count_arguments(uint8_t command)
 {
     PGM_P names = table[command].arguments;
@@ -125,7 +127,7 @@ static uint8_t count_arguments(uint8_t command)
     for (char c; (c = (char)pgm_read_byte(names)); names++) {
         count += c == ' ';
     }
-    return count;
+    return command == C_ARM ? count - 1 : count;
 }
 
 static enum error take_arguments(struct request *request, char *rest)

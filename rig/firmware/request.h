@@ -8,11 +8,12 @@
 #include "errors.h"
 #include "line.h"
 
-#define MAX_ARGUMENTS 6
+#define MAX_ARGUMENTS 7
 
 enum command {
     C_IDN,
     C_CAP,
+    C_SAFE,
     C_BOOT,
     C_STAT,
     C_TIME,
@@ -36,7 +37,7 @@ struct request {
     bool numbered;
     uint16_t number;
     uint8_t command;                     /* an enum command */
-    const char *values[MAX_ARGUMENTS];   /* in the order of the command's table */
+    const char *values[MAX_ARGUMENTS];   /* in the order of the command's table; NULL if left out */
 };
 
 /* The line is cut into words in place. Whatever the error, `numbered` and `number` hold. */

@@ -16,6 +16,12 @@ static uint16_t check_of(const struct result *result)
     return crc;
 }
 
+void result_end(struct result *result, enum phase phase, enum why why)
+{
+    result->why = why;
+    result->phase = phase;
+}
+
 static bool used(const struct result *result)
 {
     return result->cap[0] != 0;
@@ -24,9 +30,10 @@ static bool used(const struct result *result)
 static void close(struct result *result)
 {
     if (result->phase == PHASE_ARMED) {
-        result->phase = PHASE_NOT_FIRED;
+        result_end(result, PHASE_NOT_FIRED, WHY_RESET);
     } else if (result->phase != PHASE_FIRED && result->phase != PHASE_NOT_FIRED) {
-        result->phase = PHASE_PARTIAL; /* FIRING; and for an unreadable phase the careful answer */
+        /* FIRING; and for an unreadable phase the careful answer. */
+        result_end(result, PHASE_PARTIAL, WHY_RESET);
     }
 }
 
@@ -90,6 +97,26 @@ struct result *results_find(const char *cap)
         }
     }
     return NULL;
+}
+
+PGM_P why_name(uint8_t why)
+{
+    switch (why) {
+    case WHY_TTL:
+        return PSTR("ttl");
+    case WHY_SILENCE:
+        return PSTR("silence");
+    case WHY_INTERLOCK:
+        return PSTR("interlock");
+    case WHY_OVERTIME:
+        return PSTR("overtime");
+    case WHY_DISARM:
+        return PSTR("disarm");
+    case WHY_ABORT:
+        return PSTR("abort");
+    default:
+        return PSTR("reset");
+    }
 }
 
 PGM_P phase_name(uint8_t phase)

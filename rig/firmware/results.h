@@ -24,6 +24,20 @@ enum phase {
     PHASE_NOT_FIRED = 0x87,
 };
 
+/* Why a capture, or what is armed, came to its end before its time. */
+enum why {
+    WHY_NONE,
+    WHY_TTL,
+    WHY_SILENCE,
+    WHY_INTERLOCK,
+    WHY_OVERTIME,
+    WHY_DISARM,
+    WHY_ABORT,
+    WHY_RESET,
+};
+
+PGM_P why_name(uint8_t why);
+
 struct result {
     char cap[CAPTURE_ID_SIZE]; /* padded with NULs */
     uint32_t boot;
@@ -33,8 +47,12 @@ struct result {
     volatile uint8_t phase;
     volatile uint8_t shots;
     volatile uint8_t late;
+    volatile uint8_t why; /* an enum why, before the phase that it explains */
     struct instant start; /* zero until fired */
 };
+
+/* It ends before its time. */
+void result_end(struct result *result, enum phase phase, enum why why);
 
 /* After a start: drop what is not whole, close what was open. */
 void results_start(void);

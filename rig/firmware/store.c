@@ -61,6 +61,8 @@ static void count_start(void)
     start.check = check_of(start.count, sizeof start.count);
     wdt_reset();
     eeprom_update_block(&start, &starts[boot % PLACES], sizeof start);
+    /* Nothing is said under a count that a power loss could still take back. */
+    eeprom_busy_wait();
 }
 
 static void read_name(void)

@@ -7,7 +7,7 @@
 
 #include "board.h"
 
-/* Read both, and count this start. Takes 14 ms. */
+/* Read both, and count this start. Takes 17 ms. */
 void store_start(void);
 
 /* Which start this is, from 1. */

@@ -41,15 +41,17 @@ class Burst:
         return sorted(edges)
 
 
-def arm(box: FirmwareSim, capture: str, burst: Burst, lead: int = 2000) -> str:
-    """Programme the outputs anew and arm; the reply to ARM."""
+def arm(
+    box: FirmwareSim, capture: str, burst: Burst, lead: int = 2000, dead_man_ms: int = 0
+) -> str:
+    """Programme the outputs anew and arm; the reply to ARM. It fires to its end all alone."""
     box.ask("*RST")
     for output, (delay, width) in burst.pulses.items():
         box.ask(f"OUT ch={output} d={delay} w={width}")
     mask = sum(1 << (output - 1) for output in burst.pulses)
     return box.ask(
         f"ARM cap={capture} mask={mask:04X} n={burst.shots} iv={burst.interval} "
-        f"lead={lead} ttl=60000"
+        f"lead={lead} ttl=60000 dm={dead_man_ms}"
     )
 
 

@@ -12,6 +12,17 @@ from rig.acquisition.trigger.edges import OUTPUTS
 from rig.acquisition.trigger.program import Program
 from rig.acquisition.trigger.protocol import TICK_NS
 
+STOPPED = {
+    "ttl": "nobody fired it in time",
+    "silence": "the box heard nothing of its host for too long and stopped by itself",
+    "interlock": "the interlock opened",
+    "overtime": "an output stayed on for too long",
+    "disarm": "it was disarmed",
+    "abort": "it was aborted",
+    "reset": "the box was started anew",
+}
+"""What the box says of an end before its time, in words."""
+
 OUTCOMES = {
     "FIRED": FireOutcome.FIRED,
     "PARTIAL": FireOutcome.PARTIAL,
@@ -80,6 +91,8 @@ def full_report(capture: ArmedCapture, result: BoxResult, log: EdgeLog | None) -
             notes.append("the box's list of edges is not the one that was asked for")
     elif result.shots_done:
         notes.append("the edge log could not be had")
+    if result.why:
+        notes.append(STOPPED.get(result.why, result.why))
     return FireReport(
         capture_id=capture.id,
         outcome=OUTCOMES[result.result],
@@ -105,6 +118,8 @@ def known_report(capture: ArmedCapture, problem: str) -> FireReport:
 def stranger_report(capture_id: str, result: BoxResult | None, why: str) -> FireReport:
     """The report of a capture that another process has armed."""
     known = result is not None
+    if result is not None and result.why:
+        why = f"{why}; {STOPPED.get(result.why, result.why)}"
     return FireReport(
         capture_id=capture_id,
         outcome=OUTCOMES.get(result.result, FireOutcome.UNKNOWN) if result else FireOutcome.UNKNOWN,

@@ -14,6 +14,8 @@ from typing import Protocol
 
 from common.errors import InputError
 
+DEAD_MAN_S = 3.0
+
 
 class TriggerState(StrEnum):
     """Where a box is, as its driver knows it."""
@@ -63,6 +65,8 @@ class ArmRequest:
 
     ``pulses`` by output; ``shots`` in a burst, ``interval_us`` from start to start; ``lead_us``
     from FIRE to the first shot's start; ``expires_s`` until the box disarms itself.
+    ``dead_man_s``: how long a box that can goes on firing without a sign of life of this computer;
+    0 lets it fire to the end, whoever is there.
     """
 
     capture_id: str
@@ -71,6 +75,7 @@ class ArmRequest:
     interval_us: float = 0.0
     lead_us: float = 2000.0
     expires_s: float = 30.0
+    dead_man_s: float = DEAD_MAN_S
 
 
 @dataclass(frozen=True)
@@ -134,6 +139,8 @@ class TriggerCapabilities:
     acknowledges_fire: bool
     edge_log: bool
     clock: bool
+    dead_man: bool = False
+    """Whether it stops a burst by itself when this computer falls silent."""
 
 
 @dataclass(frozen=True)

@@ -10,13 +10,13 @@ from __future__ import annotations
 import threading
 import time
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from common.errors import ConflictError, DeviceError, InterlockError, RigwrightError
-from rig.acquisition.trigger.armed import ArmedCapture, full_report, plain_report
+from rig.acquisition.trigger.armed import STOPPED, ArmedCapture, full_report, plain_report
 from rig.acquisition.trigger.box import FireOutcome, TriggerState
 from rig.acquisition.trigger.client import BoxResult, EdgeLog, RefusedError
-from rig.acquisition.trigger.connection import Connection
+from rig.acquisition.trigger.connection import HEARTBEAT_S, Connection
 from rig.acquisition.trigger.lines import ErrorCode
 from rig.acquisition.trigger.link import NoAnswerError
 from rig.acquisition.trigger.program import Program
@@ -25,10 +25,25 @@ from rig.acquisition.trigger.protocol import TICK_NS
 SAMPLES_AROUND = 4
 """Readings of the clock after ARM and again after the last edge, so that no edge lies outside."""
 FIRE_ROUNDS = 3
+ARM_ROUNDS = 3
+FEEDS = 6
+"""Signs of life in a dead man's time: a few may be lost, or late on a busy computer."""
+LONGEST_REST_S = 0.5
 _KEPT = 64
 _AGAIN_S = 0.05
 _END_MARGIN_S = 0.02
+_OUTPUTS_DIFFER = frozenset({ErrorCode.NOTHING, ErrorCode.EDGES, ErrorCode.RANGE})
+"""Refusals of a programme that was checked here: the box has other outputs than it was given."""
 _ENDINGS = frozenset({"FIRED", "ABORTED", "EXPIRED", "DISARMED", "FAULT"})
+
+
+_REMEDIES: Mapping[int, str] = {
+    ErrorCode.BUSY: "wait until it is done, or abort it",
+    ErrorCode.ARMED: "abort, then try again",
+    ErrorCode.CAPTURE: "abort, then try again",
+    ErrorCode.USED: "take the capture again under another id",
+    ErrorCode.REST: "wait a second, then try again",
+}
 
 
 class Captures:
@@ -67,6 +82,7 @@ class Captures:
         even succeed: nobody would fire or disarm it.
         """
         self._require_free()
+        self._connection.look()
         self._connection.check_boot()
         self._connection.set_outputs(program)
         capture = ArmedCapture(program, self._connection.view.boots)
@@ -75,7 +91,7 @@ class Captures:
             # Only ever lowered: who gives up between the question and this line is not overruled.
             capture.wanted = False
         try:
-            made = self._connection.client.arm(program)
+            made = self._arm_at_box(program)
         except RefusedError as refused:
             self._captures.pop(capture.id)
             self._current = None
@@ -86,11 +102,28 @@ class Captures:
             raise
         if made != (len(program.edges), program.duration):
             self._refuse_program(capture)
+        if program.dead_man_ms:
+            self._connection.feed_s = program.dead_man_ms / 1000.0 / FEEDS
         self._connection.view.state = TriggerState.ARMED
         self._connection.view.armed = capture.id
         for _ in range(SAMPLES_AROUND):
             self._connection.sample()
         capture.fit = self._connection.fit()
+
+    def _arm_at_box(self, program: Program) -> tuple[int, int]:
+        """Arm. What the box turns out not to know any more is sent again, and rests are kept."""
+        for _ in range(ARM_ROUNDS - 1):
+            try:
+                return self._connection.client.arm(program)
+            except RefusedError as refused:
+                if refused.code == ErrorCode.REST:
+                    time.sleep(min(int(refused.fields.get("ms", "0")) / 1000.0, LONGEST_REST_S))
+                elif refused.code in _OUTPUTS_DIFFER:
+                    self._connection.forget_outputs()
+                    self._connection.set_outputs(program)
+                else:
+                    raise
+        return self._connection.client.arm(program)
 
     def give_up(self, capture_id: str) -> None:
         """Who asked to arm it waits no more; from any thread."""
@@ -163,7 +196,8 @@ class Captures:
         self._resolve(capture)
 
     def abort(self) -> None:
-        """All outputs low."""
+        """All outputs low; whatever was believed of the box is forgotten."""
+        self._connection.forget_outputs()
         self._connection.client.abort()
         self._resolve_ns = 0
         self._connection.look()
@@ -193,6 +227,20 @@ class Captures:
             # Armed by somebody before us: nobody is there to fire or to disarm it.
             self._connection.client.disarm(view.armed)
             self._connection.look()
+        self._see_what_was_left()
+
+    def _see_what_was_left(self) -> None:
+        """Say what became of a burst whose host was another program, or this one before."""
+        last = self._connection.last_capture
+        if last is None or last in self._captures:
+            return
+        result = self._connection.client.result(last)
+        if result is not None and result.result == "PARTIAL":
+            why = STOPPED.get(result.why, "it was stopped")
+            self._connection.view.problem = (
+                f"capture {last}, armed by another program, ended after {result.shots_done} of "
+                f"{result.shots_wanted} shots: {why}"
+            )
 
     def _wanted(self, capture_id: str) -> ArmedCapture | None:
         capture = self._captures.get(capture_id)
@@ -246,6 +294,7 @@ class Captures:
             if result.boot == self._connection.view.boots:
                 capture.fit = self._connection.fit() or capture.fit
             report = full_report(capture, result, log)
+        self._connection.feed_s = HEARTBEAT_S
         self._connection.look()
         self._resolve_ns = None
         with self.resolved:
@@ -285,6 +334,7 @@ class Captures:
         now = time.monotonic_ns()
         capture.ends_ns = now + capture.program.total * TICK_NS + int(_END_MARGIN_S * 1e9)
         self._resolve_ns = capture.ends_ns
+        self._connection.status_due_ns = 0  # from now on the box stops when it hears nothing
         self._connection.view.state = TriggerState.FIRING
         self._connection.view.armed = None
 
@@ -322,9 +372,8 @@ class Captures:
                 f"the box has stopped for safety ({refused.fields.get('why', 'no reason given')})",
                 "remove the cause, then reset the box",
             )
-        return ConflictError(
-            "trigger-refused", f"the box does not do it: {refused}", "abort, then try again"
-        )
+        remedy = _REMEDIES.get(refused.code, "reset the box, then try again")
+        return ConflictError("trigger-refused", f"the box does not do it: {refused}", remedy)
 
 
 def _interlock() -> InterlockError:

@@ -44,6 +44,19 @@ class BoxResult:
     shots_wanted: int
     start_ticks: int
     boot: int
+    why: str = ""
+    """Why it came to its end before its time; empty for a box that does not say."""
+
+
+@dataclass(frozen=True)
+class BoxStart:
+    """``BOOT?``: how often it has been started, and what tells this start from all others.
+
+    ``id`` is None for a box that has none.
+    """
+
+    count: int
+    id: str | None
 
 
 @dataclass(frozen=True)
@@ -91,11 +104,19 @@ class BoxClient:
 
     def limits(self) -> BoxLimits:
         """What it can do."""
-        return BoxLimits.read(self._ask("CAP?").reply.fields)
+        fields = self._ask("CAP?").reply.fields
+        try:
+            safe: Mapping[str, str] | None = self._ask("SAFE?").reply.fields
+        except RefusedError as refused:
+            if refused.code != ErrorCode.COMMAND:
+                raise
+            safe = None  # firmware of before
+        return BoxLimits.read(fields, safe)
 
-    def boots(self) -> int:
-        """How often it has been started."""
-        return _whole(self._ask("BOOT?").reply.fields, "n")
+    def start(self) -> BoxStart:
+        """Which of its starts this is."""
+        fields = self._ask("BOOT?").reply.fields
+        return BoxStart(_whole(fields, "n"), fields.get("id"))
 
     def status(self) -> BoxStatus:
         """How it is."""
@@ -148,6 +169,8 @@ class BoxClient:
             "lead": str(program.lead),
             "ttl": str(program.ttl_ms),
         }
+        if program.dead_man_ms is not None:
+            fields["dm"] = str(program.dead_man_ms)
         said = self._ask("ARM", fields).reply.fields
         return _whole(said, "edges"), _whole(said, "dur")
 
@@ -232,6 +255,7 @@ def _result(fields: Mapping[str, str]) -> BoxResult:
         shots_wanted=_whole(fields, "of"),
         start_ticks=_instant(fields, "t0"),
         boot=_whole(fields, "boot"),
+        why=fields.get("why", ""),
     )
 
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from common.errors import DeviceError
 from rig.acquisition.trigger.box import TriggerState
-from rig.acquisition.trigger.client import BoxClient, BoxStatus, Identity, RefusedError
+from rig.acquisition.trigger.client import BoxClient, BoxStart, BoxStatus, Identity, RefusedError
 from rig.acquisition.trigger.clock import ClockFit, ClockModel
 from rig.acquisition.trigger.link import NoAnswerError, RequestLink
 from rig.acquisition.trigger.metrics import Metrics, WireLog
@@ -67,7 +67,12 @@ class Connection:
         self._sequence = EventSequence()
         self._missing: deque[int] = deque()
         self._outputs: dict[int, tuple[int, int]] = {}
+        self._start: BoxStart | None = None
         self._boot_doubted = False
+        self._bannered = False
+        self._jumped = False
+        self.feed_s = HEARTBEAT_S
+        """How often the box wants a sign of life, at least."""
         self._last_status: BoxStatus | None = None
         self._sample_due_ns = 0
 
@@ -101,8 +106,8 @@ class Connection:
         self.view.limits = self.client.limits()
         self.view.identity = identity
         self._expected_serial = identity.serial_number
-        self.check_boot()
         status = self.look()
+        self.check_boot()
         self._sequence.restart(status.last_event)
         for _ in range(SAMPLES_AT_CONNECT - min(len(self.clock), SAMPLES_AT_CONNECT - 2)):
             self.sample()
@@ -122,16 +127,22 @@ class Connection:
     def look(self) -> BoxStatus:
         """Ask for its state."""
         status = self.client.status()
-        self.status_due_ns = time.monotonic_ns() + int(HEARTBEAT_S * 1e9)
+        pause_s = min(HEARTBEAT_S, self.feed_s)
+        self.status_due_ns = time.monotonic_ns() + int(pause_s * 1e9)
         self.view.state = STATES.get(status.state, TriggerState.FAULT)
         self.view.interlock_closed = status.interlock_closed
         self.view.armed = status.capture if status.state == "ARMED" else None
         last, self._last_status = self._last_status, status
-        if last is not None and self._jumped(last, status):
-            self._boot_doubted = True
+        if last is not None and self._clock_jumped(last, status):
+            self._boot_doubted = self._jumped = True
         return status
 
-    def _jumped(self, last: BoxStatus, status: BoxStatus) -> bool:
+    @property
+    def last_capture(self) -> str | None:
+        """The capture that the box had armed or known last, when it was last looked at."""
+        return self._last_status.capture if self._last_status is not None else None
+
+    def _clock_jumped(self, last: BoxStatus, status: BoxStatus) -> bool:
         limits = self.view.limits
         tick_ns = limits.tick_ns if limits is not None else 500
         box_s = (status.ticks - last.ticks) * tick_ns / 1e9
@@ -139,16 +150,23 @@ class Connection:
         return abs(box_s - host_s) > _JUMP_S + 0.02 * host_s
 
     def check_boot(self) -> bool:
-        """Whether the box was started anew since it was last asked; then nothing holds."""
-        boots = self.client.boots()
-        self._boot_doubted = False
-        restarted = self.view.boots is not None and boots != self.view.boots
-        self.view.boots = boots
+        """Whether the box was started anew since it was last asked; then nothing holds.
+
+        Its count alone does not tell: another box on the same path, or one that has lost its
+        permanent memory, may have counted as far. So does each start's id, where the box gives
+        one; a clock that has jumped; and, where there is no id, the banner of a start.
+        """
+        known, self._start = self._start, self.client.start()
+        self.view.boots = self._start.count
+        unnamed = self._bannered and self._start.id is None
+        restarted = known is not None and (known != self._start or self._jumped or unnamed)
+        if restarted and not self._jumped:
+            self._last_status = None  # of the start before; the next one would seem to jump
+        self._boot_doubted = self._bannered = self._jumped = False
         if restarted:
             self.metrics.count("reboots")
             self._outputs.clear()
             self.clock.clear()
-            self._last_status = None
             self._sequence.restart(None)
             self._missing.clear()
         return restarted
@@ -206,7 +224,7 @@ class Connection:
         self.metrics.count("events")
         if event.name == "BOOT":
             self._sequence.restart(event.number)
-            self._boot_doubted = True
+            self._boot_doubted = self._bannered = True
             return
         new, missing = self._sequence.accept(event.number)
         if missing:

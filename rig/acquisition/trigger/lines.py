@@ -42,6 +42,7 @@ class ErrorCode(IntEnum):
     ARMED = 222
     USED = 223
     BUSY = 230
+    REST = 231
     FAULT = 240
     UNKNOWN = 250
     NOTHING = 260

@@ -102,6 +102,7 @@ class PortOwner:
         began = time.monotonic()
         try:
             self._connection.meet()
+            self._connection.view.problem = ""
             self._captures.met()
         except (NoAnswerError, RefusedError) as problem:
             if time.monotonic_ns() > self._probe_until_ns:
@@ -111,7 +112,6 @@ class PortOwner:
             return
         self._met = True
         self._backoff_s = BACKOFF_S[0]
-        self._connection.view.problem = ""
         if not self.opened.done():
             self.opened.set_result(None)
 

@@ -14,6 +14,44 @@ MIN_LEAD_TICKS = 2000
 MIN_PAUSE_TICKS = 2000
 
 
+_LIMITS = {
+    "tick_ns": "tick_ns",
+    "max_delay": "dmax",
+    "max_width": "wmax",
+    "max_strobe_width": "smax",
+    "gap": "gap",
+    "max_edges": "edges",
+    "max_shots": "shots",
+    "hold_ms": "hold",
+}
+
+
+@dataclass(frozen=True)
+class BoxSafety:
+    """``SAFE?``: the dead man's time, as it is unless told and between what; the strobes' rest.
+
+    ``strobe_rest`` is in ticks, ``strobe_duty_percent`` the largest part of the time for which a
+    strobe may be on.
+    """
+
+    dead_man_ms: int
+    least_dead_man_ms: int
+    longest_dead_man_ms: int
+    strobe_rest: int
+    strobe_duty_percent: int
+
+    @staticmethod
+    def read(fields: Mapping[str, str]) -> BoxSafety:
+        """From the fields of the reply; raises KeyError and ValueError."""
+        return BoxSafety(
+            *(int(fields[name]) for name in ("dm", "dmmin", "dmmax", "srest", "sduty"))
+        )
+
+    def strobe_interval(self, width: int) -> int:
+        """From one pulse of a strobe to the next one, at least, in ticks."""
+        return max(width + self.strobe_rest, -(-width * 100 // self.strobe_duty_percent))
+
+
 @dataclass(frozen=True)
 class BoxLimits:
     """``CAP?`` as numbers. Times in ticks but ``hold_ms``."""
@@ -26,19 +64,24 @@ class BoxLimits:
     max_edges: int
     max_shots: int
     hold_ms: int
+    safety: BoxSafety | None = None
+    """None for a box with firmware of before: it fires on without its host."""
 
     @staticmethod
-    def read(fields: Mapping[str, str]) -> BoxLimits:
-        """From the fields of the reply; :class:`DeviceError` for a box of another protocol."""
+    def read(fields: Mapping[str, str], safe: Mapping[str, str] | None = None) -> BoxLimits:
+        """From the replies to ``CAP?`` and ``SAFE?`` (None where the box does not know that).
+
+        Raises :class:`DeviceError` for a box of another protocol.
+        """
         if fields.get("proto") != "1" or fields.get("out") != str(OUTPUTS):
             raise DeviceError(
                 "trigger-wrong",
                 f"the box speaks protocol {fields.get('proto')} with {fields.get('out')} outputs",
                 f"use a box with protocol 1 and {OUTPUTS} outputs",
             )
-        names = ("tick_ns", "dmax", "wmax", "smax", "gap", "edges", "shots", "hold")
         try:
-            return BoxLimits(*(int(fields[name]) for name in names))
+            numbers = {field: int(fields[name]) for field, name in _LIMITS.items()}
+            return BoxLimits(**numbers, safety=None if safe is None else BoxSafety.read(safe))
         except (KeyError, ValueError) as error:
             raise DeviceError(
                 "trigger-wrong",
@@ -58,6 +101,7 @@ class BoxLimits:
             acknowledges_fire=True,
             edge_log=True,
             clock=True,
+            dead_man=self.safety is not None,
         )
 
 
@@ -72,6 +116,8 @@ class Program:
     lead: int
     ttl_ms: int
     edges: tuple[OutputEdge, ...]
+    dead_man_ms: int | None = None
+    """None where the box knows no such thing."""
 
     @property
     def mask(self) -> int:
@@ -117,8 +163,11 @@ def compile_program(request: ArmRequest, limits: BoxLimits) -> Program:
         lead=round(request.lead_us * ticks_per_us),
         ttl_ms=round(request.expires_s * 1000.0),
         edges=edges,
+        dead_man_ms=round(request.dead_man_s * 1000.0) if limits.safety else None,
     )
     _check_times(program, limits)
+    if limits.safety is not None:
+        _check_safety(program, limits.safety, limits.tick_ns / 1000.0)
     return program
 
 
@@ -190,3 +239,25 @@ def _check_times(program: Program, limits: BoxLimits) -> None:
             f"the box cannot stay armed for {program.ttl_ms / 1000:g} s",
             f"give up to {limits.hold_ms / 1000:g} s",
         )
+
+
+def _check_safety(program: Program, safety: BoxSafety, tick_us: float) -> None:
+    dead_man_ms = program.dead_man_ms
+    least, most = safety.least_dead_man_ms, safety.longest_dead_man_ms
+    if dead_man_ms and not least <= dead_man_ms <= most:
+        raise InputError(
+            "trigger-dead-man",
+            f"the box cannot wait {dead_man_ms / 1000:g} s for a sign of life while it fires",
+            f"give {least / 1000:g} to {most / 1000:g} s, or 0 to let it fire alone",
+        )
+    for output in STROBES:
+        width = program.pulses.get(output, (0, 0))[1]
+        shortest = safety.strobe_interval(width)
+        if width and program.shots > 1 and program.interval < shortest:
+            raise InputError(
+                "trigger-strobe-rest",
+                f"output {output}, a strobe, cannot flash for {width * tick_us:g} us every "
+                f"{program.interval * tick_us:g} us: it must rest {safety.strobe_rest * tick_us:g} "
+                f"us and be on for at most {safety.strobe_duty_percent} % of the time",
+                f"leave {shortest * tick_us:g} us or more from start to start",
+            )

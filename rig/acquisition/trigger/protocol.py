@@ -28,6 +28,7 @@ INSTANT_DIGITS = 12
 COMMANDS: Mapping[str, tuple[str, ...]] = {
     "*IDN?": (),
     "CAP?": (),
+    "SAFE?": (),
     "BOOT?": (),
     "STAT?": (),
     "TIME?": ("pad",),
@@ -37,7 +38,7 @@ COMMANDS: Mapping[str, tuple[str, ...]] = {
     "EDGE?": ("cap", "i"),
     "SHOT?": ("cap", "k"),
     "OUT": ("ch", "d", "w"),
-    "ARM": ("cap", "mask", "n", "iv", "lead", "ttl"),
+    "ARM": ("cap", "mask", "n", "iv", "lead", "ttl", "dm"),
     "FIRE": ("cap",),
     "DISARM": ("cap",),
     "ABORT": (),
@@ -45,7 +46,9 @@ COMMANDS: Mapping[str, tuple[str, ...]] = {
     "*CLS": (),
     "SERIAL": ("sn",),
 }
-"""Every command with the arguments it takes, all of them needed."""
+"""Every command with the arguments it takes."""
+OPTIONAL = frozenset({"dm"})
+"""Arguments that may be left out, as hosts of before do; all others are needed."""
 
 CAPTURE_ID = re.compile(r"[A-Za-z0-9_-]{1,12}")
 SERIAL_NUMBER = re.compile(r"[A-Za-z0-9._-]{1,16}")
@@ -121,7 +124,7 @@ def _arguments(command: str, words: list[str], body: str, seq: int | None) -> di
         if found[1] in fields or found[1] not in COMMANDS[command]:
             raise LineError(ErrorCode.PARAMETER, body, seq)
         fields[found[1]] = found[2]
-    if len(fields) < len(COMMANDS[command]):
+    if not set(fields) >= set(COMMANDS[command]) - OPTIONAL:
         raise LineError(ErrorCode.MISSING, body, seq)
     return fields
 

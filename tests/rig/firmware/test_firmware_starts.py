@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import re
 
 import pytest
 from firmware_pulses import ALL, Burst, arm, fire
@@ -38,8 +39,8 @@ def test_every_start_is_counted_and_gives_its_cause(box: FirmwareSim, cause: Res
     count, first = boots(box)
     assert (count, first) == (1, "POWER")
     start_again(box, cause)
-    assert box.event("BOOT") == f"BOOT n=1 cause={first}"
-    assert box.event("BOOT") == f"BOOT n=2 cause={cause.name}"
+    assert re.fullmatch(f"BOOT n=1 cause={first} id=[0-9A-F]{{4}}", box.event("BOOT"))
+    assert re.fullmatch(f"BOOT n=2 cause={cause.name} id=[0-9A-F]{{4}}", box.event("BOOT"))
     assert boots(box) == (2, cause.name)
     assert "ev=1 " in box.ask("STAT?")
 
@@ -79,6 +80,42 @@ def test_a_power_loss_while_the_count_is_written_loses_no_start(js_box: Firmware
         count = now
 
 
+def test_a_count_that_was_said_never_comes_again(js_box: FirmwareSim) -> None:
+    # Cut every 0.1 ms around the end of writing the count, when the banner goes out. Whatever
+    # part of a banner got out before the power went, no later start may say the same count.
+    said: list[int] = []
+    for tenth in range(120, 220):
+        js_box.reset(Reset.POWER)
+        out = js_box.run(tenth / 10.0)
+        said += [int(found) for found in re.findall(rb"BOOT n=(\d+) ", out)]
+    assert len(said) > 10, "some starts got as far as their banner"
+    assert len(set(said)) == len(said)
+    start_again(js_box, Reset.POWER)
+    assert boots(js_box)[0] > max(said)
+
+
+def test_no_two_starts_have_the_same_id(box: FirmwareSim) -> None:
+    ids = set()
+    for _ in range(12):
+        start_again(box, Reset.EXTERNAL)
+        box.hush()
+        ids.add(box.ask("BOOT?").rpartition("id=")[2])
+    assert len(ids) == 12
+
+
+def test_boxes_whose_memory_comes_up_otherwise_have_other_ids(one_box: FirmwareSim) -> None:
+    # A start without flags, so that what is poked stands for how RAM came up with the power.
+    ids = set()
+    for noise in (b"\x00", b"\x01", b"\x80"):
+        one_box.poke(symbols()["id"], b"\x00\x00")
+        one_box.poke(symbols()["powered"], b"\xa5\xa5")
+        one_box.poke(symbols()["_end"] + 20, noise)
+        start_again(one_box, Reset(0))
+        one_box.hush()
+        ids.add(one_box.ask("BOOT?").rpartition("id=")[2])
+    assert len(ids) == 3
+
+
 def test_the_watchdog_ends_a_hanging_program(box: FirmwareSim) -> None:
     # The line's transmitter held for ever: the program waits for room that never comes.
     arm(box, "a", Burst({2: (0, 2_000_000)}))
@@ -94,7 +131,7 @@ def test_the_watchdog_ends_a_hanging_program(box: FirmwareSim) -> None:
     assert [cause for _, cause in box.resets()] == [Reset.POWER, Reset.WATCHDOG]
     # 250 ms, and 10 % that simulators and the processor's own oscillator may take.
     assert (fell.cycle - hung) / CYCLES_PER_MS < 280.0
-    assert box.event("BOOT", 50.0) == "BOOT n=2 cause=WATCHDOG"
+    assert box.event("BOOT", 50.0).startswith("BOOT n=2 cause=WATCHDOG ")
     assert "res=PARTIAL shots=0 of=1" in box.ask("RES? cap=a")
 
 
@@ -110,8 +147,8 @@ def test_results_survive_a_reset(box: FirmwareSim, cause: Reset) -> None:
     box.hush()
     fired = f"res=FIRED shots=1 of=1 t0={start:012X} late=0 boot=1"
     assert box.ask("RES? cap=fired") == f"OK {fired}"
-    for capture in ("left", "armed"):
-        none = "res=NOT_FIRED shots=0 of=1 t0=000000000000 late=0 boot=1"
+    for capture, why in (("left", "disarm"), ("armed", "reset")):
+        none = f"res=NOT_FIRED shots=0 of=1 t0=000000000000 late=0 boot=1 why={why}"
         assert box.ask(f"RES? cap={capture}") == f"OK {none}"
     assert "cap=armed " in box.ask("STAT?")
     assert box.ask("FIRE cap=armed").startswith("ERR 221")
@@ -216,7 +253,7 @@ def test_the_stack_never_comes_near_the_variables(one_box: FirmwareSim) -> None:
     # Everything that nests deepest: ARM with 32 edges, the longest refusals, events and a flood
     # while firing, the interlock's interrupt on top.
     box = one_box
-    burst = Burst({o: ((o - 1) * 50, 1000) for o in ALL}, shots=60, interval=4000)
+    burst = Burst({o: ((o - 1) * 50, 1000) for o in ALL}, shots=60, interval=9000)
     arm(box, "abcdefghijkl", burst)
     fire(box, "abcdefghijkl")
     box.send(b"TIME? pad=xxxxxxxx\nRES? cap=abcdefghijkl\nCAP?\nEDGE? cap=abcdefghijkl i=31\n" * 9)

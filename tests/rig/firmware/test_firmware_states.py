@@ -123,12 +123,11 @@ def test_a_fire_that_comes_too_late_is_refused_even_before_the_event(one_box: Fi
     assert not one_box.edges()
 
 
-def test_silence_disarms_and_any_readable_line_is_no_silence(box: FirmwareSim) -> None:
+def test_silence_disarms_and_any_checked_request_is_no_silence(box: FirmwareSim) -> None:
     arm(box, "a", SHOT)
-    for line in (sealed("1 STAT?"), "STAT?", sealed("2 OUT ch=99 d=0 w=0")):
+    for line in (sealed("1 STAT?"), sealed("2 OUT ch=99 d=0 w=0"), sealed("3 SYST:ERR?")):
         box.run(2900.0)
         assert box.ask_raw(line)
-        assert state(box) == "ARMED"
     box.run(2000.0)
     box.send(b"1 STAT? *0000\n\xff\xff\n")  # nothing of it can be trusted
     assert box.answer() == "? ERR -360 checksum"
@@ -137,12 +136,109 @@ def test_silence_disarms_and_any_readable_line_is_no_silence(box: FirmwareSim) -
     assert state(box) == "IDLE"
 
 
-def test_firing_is_not_stopped_by_silence(box: FirmwareSim) -> None:
-    burst = Burst({1: (0, 200), 2: (8_000_000, 200)})
-    arm(box, "a", burst)
+@pytest.mark.parametrize(
+    "noise",
+    [b"~{printable garbage}\n", b"STAT?\n", b"7 STAT?\n", b"ABORT *\n", b"4 OK\n"],
+    ids=["garbage", "typed", "typed with a number", "nearly an abort", "a reply"],
+)
+@pytest.mark.parametrize("when", ["armed", "firing"])
+def test_noise_is_no_sign_of_life(one_box: FirmwareSim, when: str, noise: bytes) -> None:
+    arm(one_box, "x", Burst({1: (0, 200)}, shots=64, interval=1_000_000), dead_man_ms=3000)
+    if when == "firing":
+        fire(one_box, "x")
+    for _ in range(33):
+        one_box.send(noise)
+        one_box.run(100.0)
+    one_box.hush()
+    assert one_box.ask("RES? cap=x").endswith("why=silence")
+    assert state(one_box) == "IDLE"
+
+
+def test_the_box_s_own_voice_is_no_sign_of_life(one_box: FirmwareSim) -> None:
+    # A line that hands everything back: each answer is sealed, numbered, and answered again.
+    armed(one_box)
+    for _ in range(33):
+        one_box.send((sealed("7 OK st=ARMED") + "\n" + sealed("! 7 ARMED cap=x") + "\n").encode())
+        one_box.run(100.0)
+    one_box.hush()
+    assert one_box.ask("RES? cap=x").endswith("why=silence")
+
+
+LATE_BY_MS = 100.0
+"""docs/reference/trigger-protocol.md: how long after the dead man's time the last edge may come."""
+
+
+@pytest.mark.parametrize("dead_man_ms", [500, 3000, 5000])
+def test_without_a_sign_of_life_a_burst_stops(box: FirmwareSim, dead_man_ms: int) -> None:
+    burst = Burst({1: (0, 200_000), 2: (120_000, 200)}, shots=64, interval=600_000)
+    arm(box, "a", burst, dead_man_ms=dead_man_ms)
     fire(box, "a")
-    box.run(4100.0)
-    assert result(box, "a") == "FIRED"
+    for _ in range(2):
+        box.run(0.9 * dead_man_ms)
+        assert state(box) == "FIRING"
+    last = max(cycle for cycle, byte in box.received() if byte == ord("\n"))
+    box.run(dead_man_ms + LATE_BY_MS)
+    stopped_ms = (box.edges()[-1].cycle - last) / CYCLES_PER_MS
+    # Not sooner than promised, less a shot's pause of 200 ms, in which nothing is there to stop.
+    assert dead_man_ms - 200.0 < stopped_ms < dead_man_ms + LATE_BY_MS
+    assert not highs(box)
+    assert box.event("EXPIRED") == "EXPIRED cap=a why=silence"
+    assert state(box) == "IDLE"
+    assert box.ask("RES? cap=a").endswith("why=silence")
+    assert result(box, "a") == "PARTIAL"
+
+
+def test_the_dead_man_is_on_unless_told_otherwise(one_box: FirmwareSim) -> None:
+    one_box.ask("OUT ch=1 d=0 w=200")
+    assert one_box.ask("SAFE?").startswith("OK dm=3000 ")
+    one_box.ask("ARM cap=a mask=0001 n=64 iv=2000000 lead=2000 ttl=5000")
+    fire(one_box, "a")
+    one_box.run(4000.0)
+    # At 1, 1001 and 2001 ms; the time is over at 3000 ms.
+    one_box.hush()
+    assert "res=PARTIAL shots=3 " in one_box.ask("RES? cap=a")
+
+
+def test_a_burst_may_be_left_alone(one_box: FirmwareSim) -> None:
+    arm(one_box, "a", Burst({1: (0, 200), 2: (8_000_000, 200)}), dead_man_ms=0)
+    fire(one_box, "a")
+    one_box.run(4100.0)
+    assert result(one_box, "a") == "FIRED"
+
+
+@pytest.mark.parametrize("dead_man_ms", [1, 499, 30_001])
+def test_a_dead_man_s_time_beyond_the_limits_is_refused(
+    one_box: FirmwareSim, dead_man_ms: int
+) -> None:
+    assert arm(one_box, "a", SHOT, dead_man_ms=dead_man_ms) == "ERR -222 range key=dm"
+
+
+@pytest.mark.parametrize(
+    ("width", "interval", "sound"),
+    [(50, 8_050, True), (50, 8_049, False), (4_000, 16_000, True), (4_000, 15_999, False)],
+)
+def test_a_strobe_rests_between_its_pulses(
+    one_box: FirmwareSim, width: int, interval: int, sound: bool
+) -> None:
+    # 4 ms after a short pulse; after a long one as long as leaves it on for a quarter of the time.
+    reply = arm(one_box, "a", Burst({13: (0, width)}, shots=3, interval=interval))
+    assert reply.startswith("OK") if sound else reply == "ERR -222 range key=iv"
+
+
+def test_a_strobe_rests_between_captures(one_box: FirmwareSim) -> None:
+    # 100 ms on ask for 300 ms off. What has no strobe, or a late one, need not wait.
+    arm(one_box, "a", Burst({13: (0, 200_000)}))
+    fire(one_box, "a")
+    one_box.run(110.0)
+    reply = arm(one_box, "b", Burst({13: (0, 100)}))
+    assert reply.startswith("ERR 231 rest ms=")
+    wait_ms = int(reply.rpartition("=")[2])
+    assert 200 < wait_ms < 300
+    assert arm(one_box, "c", Burst({1: (0, 100)})).startswith("OK")
+    assert arm(one_box, "d", Burst({13: (600_000, 100)})).startswith("OK")
+    one_box.ask("DISARM cap=d")
+    one_box.run(wait_ms)
+    assert arm(one_box, "e", Burst({13: (0, 100)})).startswith("OK")
 
 
 def test_the_interlock_lowers_everything_at_once(box: FirmwareSim) -> None:
@@ -212,9 +308,9 @@ def test_the_supervisor_lets_every_allowed_pulse_be(one_box: FirmwareSim) -> Non
     box = one_box
     arm(box, "a", Burst({1: (0, 16_000_000), 13: (0, 200_000), 14: (15_800_000, 200_000)}))
     fire(box, "a")
-    box.run(8100.0)
+    box.run(8400.0)  # 300 ms more for the strobe to rest
     assert result(box, "a") == "FIRED"
-    arm(box, "b", Burst({13: (0, 40_000)}, shots=60, interval=65_536))
+    arm(box, "b", Burst({1: (0, 40_000), 13: (0, 16_000)}, shots=60, interval=65_536))
     box.run(7.0)
     fire(box, "b")
     box.run(2100.0)

@@ -67,7 +67,9 @@ def test_edges_of_every_distance_are_exact(one_box: FirmwareSim, flood: bytes) -
     # way of waiting to another.
     for gap in (4, 5, 9, 31, 32, 33, 34, 36, 40, 46, 50, 64, 99, 119, 120, 121, 122, 130):
         pulses = {output: ((output - 1) * gap, 16 * gap) for output in ALL}
-        burst = Burst(pulses, 3, 40 * gap + 2000)
+        # The strobes' rest and duty ask for more than the edges do.
+        interval = max(64 * gap, 16 * gap + 8000)
+        burst = Burst(pulses, 3, interval)
         made = played(one_box, burst, capture=f"gap{gap}", flood=flood[: 12 * gap])
         assert set(offsets(burst, made)) == {0}, gap
         assert " late=0 " in one_box.ask(f"RES? cap=gap{gap}")
@@ -172,7 +174,8 @@ def test_late_edges_are_owned_up_to(js_box: FirmwareSim) -> None:
 def test_time_is_answered_at_its_instant(box: FirmwareSim, firing: bool) -> None:
     epoch = _cycle_of_tick_0(box)
     if firing:
-        burst = Burst({output: (output * 50, 1025) for output in ALL}, shots=60, interval=3901)
+        lines = [output for output in ALL if output not in (13, 14)]
+        burst = Burst({output: (output * 50, 1025) for output in lines}, 60, 3901)
         arm(box, "a", burst)
         fire(box, "a")
     box.run(5.0)
@@ -191,8 +194,8 @@ def test_time_is_answered_at_its_instant(box: FirmwareSim, firing: bool) -> None
         assert at - came < 20 * CYCLES_PER_MS
         if box.simulator == "avr8js":  # simavr shows a byte a while after it is whole
             # To the reading of the clock in the interrupt: 5 us, and while firing what the edge
-            # interrupt takes, which looks for bytes too: 20 us.
-            latest = 20 * 16 if firing else 5 * 16
+            # interrupt takes, which looks for bytes too: 24 us.
+            latest = 24 * 16 if firing else 5 * 16
             assert 0 < epoch + (rx + 1) * CYCLES_PER_TICK - came <= latest
 
 

@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Mapping
 
 from rig.acquisition.trigger.edges import OUTPUTS, compile_edges, nearest
-from rig.acquisition.trigger.fake.device import FIRMWARE, FakeBox
+from rig.acquisition.trigger.fake.device import FIRMWARE, SILENCE_MS, TICKS_PER_MS, FakeBox
 from rig.acquisition.trigger.fake.memory import Capture
 from rig.acquisition.trigger.lines import ErrorCode, LineError, RawLine
 from rig.acquisition.trigger.protocol import (
@@ -21,7 +21,7 @@ from rig.acquisition.trigger.protocol import (
 MIN_LEAD = 2000
 MIN_PAUSE = 2000
 MAX_PAD = 60
-NUMBERS = frozenset({"ch", "d", "i", "iv", "k", "lead", "n", "ttl", "w"})
+NUMBERS = frozenset({"ch", "d", "dm", "i", "iv", "k", "lead", "n", "ttl", "w"})
 """Keys whose values are decimal numbers."""
 
 Fields = Mapping[str, str]
@@ -47,14 +47,14 @@ def answer(box: FakeBox, line: RawLine, received_ticks: int) -> bytes:
             request = parse_request(line)
         except LineError as error:
             return _refuse_line(box, error)
-        box.hear()
+        if request.checksum is not None:
+            box.hear()
         return _answer_request(box, request, received_ticks)
 
 
 def _refuse_line(box: FakeBox, error: LineError) -> bytes:
     if error.code in (ErrorCode.CHARACTER, ErrorCode.CHECKSUM):
         return Reply("?", error.code, error.code.word, {}).line()
-    box.hear()
     return _refuse(box, error.seq, error.code, {})
 
 
@@ -133,8 +133,21 @@ def _cap(box: FakeBox, _: Fields) -> Fields:
     return {key: str(value) for key, value in values.items()}
 
 
+def _safe(box: FakeBox, _: Fields) -> Fields:
+    limits = box.limits
+    values = {
+        "dm": limits.dead_man_ms,
+        "dmmin": limits.least_dead_man_ms,
+        "dmmax": limits.longest_dead_man_ms,
+        "silence": SILENCE_MS,
+        "srest": limits.strobe_rest,
+        "sduty": 100 // limits.strobe_duty,
+    }
+    return {key: str(value) for key, value in values.items()}
+
+
 def _boot(box: FakeBox, _: Fields) -> Fields:
-    return {"n": str(box.permanent.boots), "cause": box.cause}
+    return {"n": str(box.permanent.boots), "cause": box.cause, "id": box.start_id}
 
 
 def _stat(box: FakeBox, _: Fields) -> Fields:
@@ -177,6 +190,7 @@ def _result(box: FakeBox, fields: Fields) -> Fields:
         "t0": instant_text(capture.start),
         "late": str(capture.late),
         "boot": str(capture.boot),
+        **({"why": capture.why} if capture.why else {}),
     }
 
 
@@ -239,6 +253,7 @@ def _arm(box: FakeBox, fields: Fields) -> Fields:
     shots = _number(fields, "n", 1, box.limits.max_shots)
     lead = _number(fields, "lead", MIN_LEAD, box.limits.max_delay)
     ttl_ms = _number(fields, "ttl", 1, box.limits.hold_ms)
+    dead_man_ms = _dead_man_ms(box, fields)
     _refuse_unless_idle(box)
     if not box.interlock_closed:
         raise Refusal(ErrorCode.INTERLOCK)
@@ -250,12 +265,29 @@ def _arm(box: FakeBox, fields: Fields) -> Fields:
     if len(edges) > box.limits.max_edges or nearest(edges) < box.limits.gap:
         raise Refusal(ErrorCode.EDGES)
     highest = box.limits.max_delay + box.limits.max_width + MIN_PAUSE
-    shortest = edges[-1].at + MIN_PAUSE
+    strobes = box.strobes(int(fields["mask"], 16))
+    rests = [box.limits.rest_after(width) for _, width in strobes]
+    needed = (width + rest for (_, width), rest in zip(strobes, rests, strict=True))
+    shortest = max(edges[-1].at + MIN_PAUSE, *needed, 0)
     interval = _number(fields, "iv", *((0, 0) if shots == 1 else (shortest, highest)))
-    boot = box.permanent.boots
-    box.arm(Capture(capture_id, boot, shots, interval, lead, edges), ttl_ms)
+    if strobes:
+        first = box.ticks() + lead + min(delay for delay, _ in strobes)
+        if box.strobe_ready > first:
+            left_ms = max(box.strobe_ready - box.ticks(), 0) // TICKS_PER_MS + 1
+            raise Refusal(ErrorCode.REST, ms=str(left_ms))
+    boot, rest = box.permanent.boots, max(rests, default=0)
+    box.arm(Capture(capture_id, boot, shots, interval, lead, edges, dead_man_ms, rest), ttl_ms)
     counts = {"edges": str(len(edges)), "dur": str(edges[-1].at)}
     return {"st": "ARMED", "cap": capture_id, **counts}
+
+
+def _dead_man_ms(box: FakeBox, fields: Fields) -> int:
+    if "dm" not in fields:
+        return box.limits.dead_man_ms
+    wanted = _number(fields, "dm", 0, box.limits.longest_dead_man_ms)
+    if 0 < wanted < box.limits.least_dead_man_ms:
+        raise Refusal(ErrorCode.RANGE, key="dm")
+    return wanted
 
 
 def _require_armed(box: FakeBox, capture_id: str) -> Capture:
@@ -283,7 +315,7 @@ def _fire(box: FakeBox, fields: Fields) -> Fields:
 
 def _disarm(box: FakeBox, fields: Fields) -> Fields:
     capture = _require_armed(box, _capture_id(fields))
-    box.stop("DISARMED", {})
+    box.stop("DISARMED", {}, "disarm")
     return {"cap": capture.id}
 
 
@@ -316,6 +348,7 @@ def _serial(box: FakeBox, fields: Fields) -> Fields:
 _HANDLERS: Mapping[str, Callable[[FakeBox, Fields], Fields]] = {
     "*IDN?": _idn,
     "CAP?": _cap,
+    "SAFE?": _safe,
     "BOOT?": _boot,
     "STAT?": _stat,
     "SYST:ERR?": _next_error,

@@ -7,11 +7,12 @@ whenever that is called, so what a test sees does not depend on how busy the com
 from __future__ import annotations
 
 import random
+import secrets
 import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-from rig.acquisition.trigger.edges import OUTPUTS
+from rig.acquisition.trigger.edges import OUTPUTS, STROBES
 from rig.acquisition.trigger.fake.clock import BoxClock
 from rig.acquisition.trigger.fake.limits import FakeLimits, PhysicalEdge
 from rig.acquisition.trigger.fake.memory import (
@@ -24,8 +25,9 @@ from rig.acquisition.trigger.fake.memory import (
 )
 from rig.acquisition.trigger.protocol import Event, instant_text
 
-SILENCE_S = 3.0
-FIRMWARE = "fake-1"
+SILENCE_MS = 3000
+TICKS_PER_MS = 2000
+FIRMWARE = "fake-2"
 
 
 @dataclass(frozen=True)
@@ -69,6 +71,7 @@ class FakeBox:
         self._now_ns = now_ns
         self._random = random.Random(settings.seed)  # noqa: S311 - lateness of a fake
         self._level = 0
+        self.strobe_ready = 0
         self._start("POWER")
 
     def _start(self, cause: str) -> None:
@@ -76,6 +79,8 @@ class FakeBox:
         self.deaf_until_ns = self._now_ns()
         self.permanent.boots += 1
         self.cause = cause
+        # Another one at each start of each fake, whatever its seed: that is what it is for.
+        self.start_id = f"{secrets.randbits(16):04X}"
         self.state = "IDLE"
         self.fault = ""
         self.pulses: dict[int, tuple[int, int]] = {}
@@ -84,11 +89,13 @@ class FakeBox:
         self.errors = ErrorQueue()
         self.armed: Capture | None = None
         self._expires = 0
-        self._heard = 0
+        self.heard = 0
+        """The instant of the last sign of life, in ticks."""
         self._shot = 0
         self._edge = 0
         self._shot_late: list[int] = []
-        self.announce("BOOT", {"n": str(self.permanent.boots), "cause": cause})
+        started = {"n": str(self.permanent.boots), "cause": cause, "id": self.start_id}
+        self.announce("BOOT", started)
 
     # -- time --------------------------------------------------------------------------------
 
@@ -101,7 +108,7 @@ class FakeBox:
         with self.lock:
             now = self.ticks()
             while (due := self._next_due()) is not None and due <= now:
-                if self.state == "FIRING":
+                if self.state == "FIRING" and due != self._silent_at():
                     self._make_edge()
                 else:
                     self._expire(due)
@@ -117,15 +124,25 @@ class FakeBox:
             return None
         if self.state == "FIRING":
             start = self.armed.start + self._shot * self.armed.interval
-            return start + self.armed.edges[self._edge].at
-        return min(self._expires, self._silent_at())
+            edge = start + self.armed.edges[self._edge].at
+            silent = self._silent_at()
+            return edge if silent is None else min(edge, silent)
+        return min(self._expires, self.heard + SILENCE_MS * TICKS_PER_MS)
 
-    def _silent_at(self) -> int:
-        return self._heard + int(SILENCE_S * 2_000_000)
+    def _silent_at(self) -> int | None:
+        """When a burst ends unless its host is heard; None for one that may be left alone."""
+        if self.armed is None or self.armed.dead_man_ms == 0:
+            return None
+        return self.heard + self.armed.dead_man_ms * TICKS_PER_MS
+
+    def strobes(self, mask: int) -> list[tuple[int, int]]:
+        """Delay and width of each strobe of a mask that has a pulse."""
+        wanted = (self.pulses.get(o, (0, 0)) for o in STROBES if mask & 1 << (o - 1))
+        return [pulse for pulse in wanted if pulse[1]]
 
     def hear(self) -> None:
-        """A valid line has come: the silence is over."""
-        self._heard = self.ticks()
+        """A checked request has come: the host is there."""
+        self.heard = self.ticks()
 
     # -- captures ----------------------------------------------------------------------------
 
@@ -134,7 +151,7 @@ class FakeBox:
         self.captures.add(capture)
         self.armed = capture
         self.state = "ARMED"
-        self._expires = self.ticks() + ttl_ms * 2000
+        self._expires = self.ticks() + ttl_ms * TICKS_PER_MS
         self.hear()
         self.announce("ARMED", {"cap": capture.id})
 
@@ -146,12 +163,15 @@ class FakeBox:
         self._shot = self._edge = 0
         self._shot_late = []
 
-    def stop(self, event: str, fields: Mapping[str, str]) -> None:
+    def stop(self, event: str, fields: Mapping[str, str], why: str, at: int | None = None) -> None:
         """End a capture that is ARMED or FIRING before its time; all outputs low."""
-        self._set_pins(0, self.ticks())
+        self._set_pins(0, self.ticks() if at is None else at)
         capture = self.armed
         if capture is None:
             return
+        capture.why = why
+        if self.state == "FIRING":
+            self.strobe_ready = self.ticks() + capture.strobe_rest
         capture.result = "PARTIAL" if self.state == "FIRING" else "NOT_FIRED"
         self.armed = None
         self.state = "IDLE"
@@ -160,10 +180,12 @@ class FakeBox:
     def abort(self) -> None:
         """All outputs low; ends what is armed or firing."""
         shots = len(self.armed.shots) if self.armed else 0
-        self.stop("ABORTED", {"shots": str(shots)})
+        self.stop("ABORTED", {"shots": str(shots)}, "abort")
 
     def _expire(self, due: int) -> None:
-        self.stop("EXPIRED", {"why": "ttl" if due == self._expires else "silence"})
+        over = self.state == "ARMED" and due == self._expires
+        why = "ttl" if over else "silence"
+        self.stop("EXPIRED", {"why": why}, why, due)
 
     def _make_edge(self) -> None:
         capture = self.armed
@@ -188,6 +210,7 @@ class FakeBox:
         self.announce("DONE", {**fields, "late": str(late)})
         if self._shot == capture.shots_wanted:
             capture.result = "FIRED"
+            self.strobe_ready = start + capture.duration + capture.strobe_rest
             self.armed = None
             self.state = "IDLE"
             first = instant_text(capture.start)
@@ -219,7 +242,7 @@ class FakeBox:
     def fail(self, why: str) -> None:
         """Stop for safety: FAULT, all outputs low."""
         with self.lock:
-            self.stop("FAULT", {"why": why})
+            self.stop("FAULT", {"why": why}, why)
             self.state = "FAULT"
             self.fault = why
 
@@ -230,6 +253,8 @@ class FakeBox:
             self._set_pins(0, self.ticks())
             if self.armed is not None:
                 self.armed.result = "PARTIAL" if self.state == "FIRING" else "NOT_FIRED"
+                self.armed.why = "reset"
+            self.strobe_ready = 0
             if not keeps_power:
                 self.captures = CaptureMemory()
             self._start(cause)

@@ -9,7 +9,7 @@ from rig.acquisition.trigger.edges import STROBES
 
 @dataclass(frozen=True)
 class FakeLimits:
-    """What ``CAP?`` reports, in ticks but ``hold_ms``."""
+    """What ``CAP?`` and ``SAFE?`` report, in ticks but where a name ends in ``_ms``."""
 
     max_delay: int = 60_000_000
     max_width: int = 10_000_000
@@ -18,6 +18,16 @@ class FakeLimits:
     max_edges: int = 32
     max_shots: int = 255
     hold_ms: int = 600_000
+    dead_man_ms: int = 3000
+    least_dead_man_ms: int = 500
+    longest_dead_man_ms: int = 30_000
+    strobe_rest: int = 8000
+    strobe_duty: int = 4
+    """A strobe may be on for one part in so many."""
+
+    def rest_after(self, width: int) -> int:
+        """How long a strobe is off after a pulse of that width, at least."""
+        return max(self.strobe_rest, width * (self.strobe_duty - 1))
 
     def width_of(self, output: int) -> int:
         """The widest pulse of one output."""

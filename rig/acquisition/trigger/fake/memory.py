@@ -35,7 +35,11 @@ class Capture:
     interval: int
     lead: int
     edges: tuple[OutputEdge, ...]
+    dead_man_ms: int
+    strobe_rest: int
     result: str = "ARMED"
+    why: str = ""
+    """Why it came to its end before its time."""
     start: int = 0
     """Instant of the first shot's start; 0 before FIRE."""
     shots: list[tuple[int, int]] = field(default_factory=list)
