@@ -23,12 +23,15 @@ help:
 $(STAMP): pyproject.toml constraints.txt
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Rigwright needs Python 3.11 or newer")'
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	@echo "Setting up $(VENV), once: 1.8 GB, about three minutes."
 	$(BIN)/python -m pip install --quiet --upgrade pip
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[dev]'
+	$(BIN)/python -m pip install --constraint constraints.txt --editable '.[dev]'
 	touch $(STAMP)
 
 demo: $(STAMP)
+	@echo "Designing seven cameras for the bundled head: about a minute on two quiet cores."
 	$(BIN)/rigwright demo --out $(OUT) --force
+	@echo "For the command rigwright in this terminal: . $(BIN)/activate"
 
 test: $(STAMP)
 	$(BIN)/python -m pytest -n $(QUICK_WORKERS) --dist loadfile -m 'not slow'

@@ -27,6 +27,8 @@ def new_folder(
     ``spare``, which would be lost; :class:`InputError` where nothing can be written.
     """
     _refuse_place(out)
+    _refuse_loss(out, spare)
+    _refuse_here(out)
     if _holds_something(out):
         if not force:
             raise ConflictError(
@@ -35,7 +37,6 @@ def new_folder(
                 "give another --out, or --force to replace results that are in it",
             )
         _refuse_foreign(out, out, renewed)
-    _refuse_loss(out, spare)
     made = [parent for parent in out.parents if not parent.exists()]
     partial = _beside(out)
     try:
@@ -93,11 +94,15 @@ def refuse_others(out: Path, own: Collection[str]) -> None:
 
 
 def _refuse_place(out: Path) -> None:
-    """Refuse what is no folder of its own: links, files, and where the user stands."""
+    """Refuse what is no folder of its own."""
     if out.is_symlink():
         raise ConflictError("out-not-a-folder", f"{out} is a link", "give another --out")
     if out.exists() and not out.is_dir():
         raise InputError("out-not-a-folder", f"{out} is a file", "give another --out")
+
+
+def _refuse_here(out: Path) -> None:
+    """Refuse to rename away the folder that the user stands in."""
     if out.exists() and Path.cwd().is_relative_to(out.resolve()):
         raise ConflictError(
             "out-here", f"{out} is the folder you are in, or above it", "name a new folder"

@@ -11,7 +11,7 @@ from common.errors import InputError
 
 FILE = "scan.json"
 SCHEMA = "rigwright.design-scan/1"
-_REMEDY = "give the head with --scan"
+_REMEDY = "give --scan"
 
 
 def remember_scan(folder: Path, out: Path, scan: Path) -> None:

@@ -27,6 +27,7 @@ from service_helpers import (
 )
 from starlette.testclient import TestClient
 
+from common.files.ownership import files_of
 from geometry.head import synthetic_head
 from rig.report.designfolder import FILE_NAMES
 from service import work
@@ -261,8 +262,8 @@ class TestOnTheCommandLine:
         out = tmp_path / "out"
         done = self.run("design", head, "--rig", rig_file, "--out", out, "--workers", 1)
         assert done.returncode == 0, done.stderr
-        assert {path.name for path in out.iterdir()} == set(FILE_NAMES)
-        for path in out.iterdir():
+        assert set(files_of(out)) == {*FILE_NAMES, "scan.json"}
+        for path in (out / name for name in FILE_NAMES):
             assert f"\n  {path}\n" in done.stdout
         assert "points seen by 2 or more" in done.stdout
         assert "inferred: " in done.stdout
@@ -373,7 +374,7 @@ class TestOnTheCommandLine:
     def test_the_demo(self, tmp_path: Path) -> None:
         done = self.run("demo", "--out", tmp_path / "demo", "--json")
         assert done.returncode == 0, done.stderr
-        names = {path.name for path in (tmp_path / "demo").iterdir()}
+        names = set(files_of(tmp_path / "demo"))
         assert names == {*FILE_NAMES, "head.ply", "face.toml", "station.toml"}
         again = self.run(
             "evaluate",

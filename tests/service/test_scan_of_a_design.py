@@ -40,13 +40,13 @@ def test_it_is_found_after_both_moved(design: Path, tmp_path: Path) -> None:
 
 def test_a_scan_that_changed_is_told(design: Path, tmp_path: Path) -> None:
     (tmp_path / "heads" / "head.glb").write_bytes(b"haed")
-    with pytest.raises(InputError, match="has changed since the design was made; give the head"):
+    with pytest.raises(InputError, match="has changed since the design was made; give --scan"):
         scan_of(design)
 
 
 def test_a_scan_that_is_gone_is_told(design: Path, tmp_path: Path) -> None:
     (tmp_path / "heads" / "head.glb").unlink()
-    with pytest.raises(InputError, match=r"head\.glb is not there any more; give the head with"):
+    with pytest.raises(InputError, match=r"head\.glb is not there any more; give --scan"):
         scan_of(design)
 
 

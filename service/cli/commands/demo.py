@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -29,3 +30,8 @@ def demo(
 
     run = RunContext(workers=processes(workers))
     run_design(DEMO, DemoRequest, {}, run, out, as_json=as_json, force=force)
+    if not as_json:
+        sys.stdout.write(
+            f"Next: open {out / 'report.html'} in a browser, then fire its simulated cameras:\n"
+            f"  rigwright capture --station {out / 'station.toml'} --session sessions/first\n"
+        )
