@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, replace
+from enum import StrEnum
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from geometry.arrays import Floats
 from geometry.camera import Camera, RigCamera
 from geometry.frames import Pose
 from geometry.subject import Subject
-from solver.coverage.views import judge
+from solver.coverage.views import NEAR, judge
 from solver.infeasibility import conflicts
 from solver.limits import Limits
 from solver.outer_loop import StartResult
@@ -22,12 +23,28 @@ from solver.problem import Problem, camera_at
 from solver.quality import evaluate
 from solver.refinement import refine
 from solver.result import Design, Quality, Relaxation, SolverReport, StartReport, Status
+from solver.search.exchange import search_networks
 from solver.starts import kmeans_start, strips
 
 ENGINE = "sequential quadratic programming with exact second derivatives (PIQP)"
 _EXPECTED_OUTER_ITERATIONS = 8
+_FINE = 2
+"""How many networks of the search are optimised continuously."""
+
 _REFINEMENT_COST = 1.01
 _REFINEMENT_TRIES = 3
+
+
+class Strategy(StrEnum):
+    """Where starts come from.
+
+    ``EXCHANGE``: networks searched among candidate poses, each then moved a little; where none
+    of them meets the limits, or limits are on that the search does not know, also ``K_MEANS``:
+    the source paper's clusters, the best strip, and clusters jittered.
+    """
+
+    EXCHANGE = "exchange"
+    K_MEANS = "k-means"
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +59,7 @@ class Request:
     starts: int
     fixed: tuple[RigCamera, ...]
     start: tuple[Pose, ...] | None
+    strategy: Strategy
 
     def __post_init__(self) -> None:
         total = self.count + len(self.fixed)
@@ -109,6 +127,7 @@ def design(
     fixed: tuple[RigCamera, ...] = (),
     start: tuple[Pose, ...] | None = None,
     workers: int = 1,
+    strategy: Strategy = Strategy.K_MEANS,
     progress: ProgressCallback = ignore_progress,
     cancel: CancelToken | None = None,
 ) -> Design:
@@ -121,25 +140,28 @@ def design(
     ``infeasible`` and the conflicts named. Raises :class:`InputError` for orders that cannot be
     understood and :class:`CancelledError` within a second of ``cancel`` being set.
     """
-    request = Request(subject, camera, limits, count, seed, starts, fixed, start)
+    request = Request(subject, camera, limits, count, seed, starts, fixed, start, strategy)
     token = cancel or NeverCancelled()
     began = time.monotonic()
     tell = _Teller(progress, starts)
     tell.stage("start", 0.0)
-    jobs = _jobs(request, token)
-    results = run_all(jobs, workers, tell.step, token)
+    jobs = _searched_jobs(request, token)
+    results = run_all(jobs, workers, tell.step, token) if jobs else []
+    scores = _scores(jobs, results, token)
+    if not any(s.feasible for s in scores) or not search_knows(limits):
+        more = _jobs(request, len(jobs), token)
+        others = run_all(more, workers, tell.step, token)
+        scores += _scores(more, others, token)
+        jobs, results = jobs + more, results + others
     tell.stage("choose", 0.9)
-    scores = []
-    for job, result in zip(jobs, results, strict=True):
-        if token.is_set():
-            raise CancelledError
-        scores.append(
-            evaluate(subject, job.problem.placed(result.values), limits, job.problem.anchor)
-        )
     best = min(range(len(jobs)), key=lambda k: (*_rank(scores[k]), k))
     problem = jobs[best].problem
     tell.stage("refine", 0.93)
     values, quality, kkt, why, iterations = _finish(problem, results[best], scores[best], token)
+    begin = evaluate(subject, problem.cameras, limits, problem.anchor)
+    if _rank(begin) < _rank(quality):
+        values, quality, kkt = problem.start_values(), begin, np.nan
+        why = "no solve found anything better than the start"
     found: tuple[Relaxation, ...] = ()
     if not quality.feasible:
         tell.stage("diagnose", 0.96)
@@ -158,7 +180,6 @@ def design(
         starts=tuple(_start_report(j, r, s) for j, r, s in zip(jobs, results, scores, strict=True)),
         conflicts=found,
     )
-    begin = evaluate(subject, problem.cameras, limits, problem.anchor)
     tell.stage("done", 1.0)
     return Design(problem.placed(values), quality, problem.cameras, begin, limits, report)
 
@@ -168,7 +189,7 @@ class _Teller:
 
     def __init__(self, progress: ProgressCallback, starts: int) -> None:
         self._progress = progress
-        self._done = [0.0] * starts
+        self._done = [0.0] * (starts + _FINE)
         self._fraction = 0.0
 
     def stage(self, name: str, fraction: float) -> None:
@@ -183,7 +204,48 @@ class _Teller:
         self._progress(Progress("solve", self._fraction, start, iteration, cost, violation))
 
 
-def _jobs(request: Request, cancel: CancelToken) -> list[StartJob]:
+def _scores(jobs: list[StartJob], results: list[StartResult], cancel: CancelToken) -> list[Quality]:
+    """Each result as it is judged: on the check points."""
+    out = []
+    for job, result in zip(jobs, results, strict=True):
+        if cancel.is_set():
+            raise CancelledError
+        problem = job.problem
+        cameras = problem.placed(result.values)
+        out.append(evaluate(problem.subject, cameras, problem.limits, problem.anchor))
+    return out
+
+
+def search_knows(limits: Limits) -> bool:
+    """Whether the search among candidates heeds all limits that decide where cameras stand."""
+    ratio, bounds = limits.base_height, limits.bounds
+    others = (limits.spacing, limits.symmetry, limits.incidence.mean_max_deg, bounds)
+    means = (ratio.mean_min, ratio.mean_max)
+    return all(v is None for v in (*others, *means))
+
+
+def _searched_jobs(request: Request, cancel: CancelToken) -> list[StartJob]:
+    """The best networks of the search among candidates, unless poses to start from are given."""
+    if request.start is not None or request.strategy is not Strategy.EXCHANGE:
+        return []
+    found = search_networks(
+        request.subject,
+        request.camera,
+        request.limits,
+        request.names,
+        request.fixed,
+        request.seed,
+        cancel,
+    )
+    if cancel.is_set():
+        raise CancelledError
+    return [
+        StartJob(k, "exchange", request.problem(cameras), request.seed, near=True)
+        for k, cameras in enumerate(found[: min(_FINE, request.starts)])
+    ]
+
+
+def _jobs(request: Request, first: int, cancel: CancelToken) -> list[StartJob]:
     """The given or the k-means start, the best strip, then jittered k-means starts."""
     subject, camera, limits, names = request.subject, request.camera, request.limits, request.names
     jobs: list[StartJob] = []
@@ -191,7 +253,7 @@ def _jobs(request: Request, cancel: CancelToken) -> list[StartJob]:
     def add(kind: str, cameras: tuple[RigCamera, ...]) -> None:
         if cancel.is_set():
             raise CancelledError
-        jobs.append(StartJob(len(jobs), kind, request.problem(cameras), request.seed))
+        jobs.append(StartJob(first + len(jobs), kind, request.problem(cameras), request.seed))
 
     if request.start is not None:
         add(
@@ -260,7 +322,8 @@ def _finish(
 
     A refinement that loses a point is repeated with that point named for more views.
     """
-    for _ in range(_REFINEMENT_TRIES):
+    # A search ends so near an optimum that a second try with more points finds nothing else.
+    for _ in range(1 if result.reach == NEAR else _REFINEMENT_TRIES):
         outcome = refine(problem, result, cancel)
         refined = evaluate(
             problem.subject, problem.placed(outcome.values), problem.limits, problem.anchor

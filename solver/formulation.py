@@ -12,7 +12,7 @@ from solver.constraints.builders.coverage import assigned_view_constraints
 from solver.constraints.builders.positions import position_constraints
 from solver.constraints.builders.rays import ray_constraints
 from solver.constraints.candidates import CandidateConstraints
-from solver.coverage.views import Views
+from solver.coverage.views import Views, views
 from solver.information import CovarianceCost
 from solver.problem import Problem
 from solver.variables import FOCUS, PER_CAMERA, NetworkState
@@ -73,6 +73,12 @@ def covariance_cost(problem: Problem, seen: Views, scale: float = 1.0) -> Covari
     """The cost with the rays that are seen now."""
     weight = seen.seen * problem.ray_weight[:, None]
     return CovarianceCost(problem.points, weight, problem.prior, scale)
+
+
+def cost_scale(problem: Problem, values: Floats) -> float:
+    """The cost's unit for a solve from the unknowns (7 n,): the median of the points' norms."""
+    state = problem.unknowns.state(values)
+    return covariance_cost(problem, views(problem, state)).typical(state)
 
 
 def candidate_constraints(

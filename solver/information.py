@@ -76,6 +76,23 @@ def _normal_entries(rays: _Rays, axis: Floats, prior: float) -> Floats:
     return entries
 
 
+def ray_information(state: NetworkState, points: Floats, weight: Floats) -> Floats:
+    """Six entries (n, 6, p) of the information of each camera's ray to each point (p, 3).
+
+    ``weight`` (n, p) is (f/s)**2, or 0 where a camera does not see a point.
+    """
+    rays, axis = _rays(state, points, weight), state.axis
+    alpha = weight / rays.z**2
+    beta = alpha / rays.z
+    gamma = beta * rays.rr / rays.z
+    out = np.empty((len(axis), 6, len(points)))
+    for row, (k, m) in enumerate(_PAIRS):
+        own = axis[:, k, None] * rays.d[m] + rays.d[k] * axis[:, m, None]
+        out[:, row] = (axis[:, k] * axis[:, m])[:, None] * gamma - beta * own
+    out[:, :3] += alpha[:, None]
+    return out
+
+
 def normal_matrices(state: NetworkState, points: Floats, weight: Floats, prior: float) -> Floats:
     """``N0 + sum N`` of each point, (p, 3, 3); ``weight`` (n, p) is (f/s)**2 or 0 where unseen."""
     return symmetric(_normal_entries(_rays(state, points, weight), state.axis, prior))

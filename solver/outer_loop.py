@@ -19,11 +19,21 @@ from solver.constraints.builders.coverage import cut_constraints
 from solver.constraints.candidates import CandidateConstraints
 from solver.coverage.assignment import Margins
 from solver.coverage.cuts import VisibilityCuts, cuts_for_hidden, opening_directions
-from solver.coverage.views import FIRST_MARGINS, Judged, Views, judge, views, with_points
+from solver.coverage.views import (
+    FAR,
+    FIRST_MARGINS,
+    Judged,
+    Reach,
+    Views,
+    judge,
+    views,
+    with_points,
+)
 from solver.formulation import (
     COVERAGE,
     Merit,
     candidate_constraints,
+    cost_scale,
     covariance_cost,
     merit,
     unknown_bounds,
@@ -52,7 +62,8 @@ class StartResult:
     """What came of one start: unknowns (7 n,), merit and how it went.
 
     ``added_points`` are check points that had to be named for more views, ``margins`` what was
-    assigned beyond the limits: whoever goes on from here has to assign the same.
+    assigned beyond the limits, ``reach`` how far cameras were expected to move: whoever goes on
+    from here has to ask for the same.
     """
 
     values: Floats
@@ -64,9 +75,10 @@ class StartResult:
     why: str
     added_points: Ints
     margins: Margins
+    reach: Reach = FAR
 
 
-class _Monitor:
+class Monitor:
     """Counts what was done so far, passes it on, and says whether to go on."""
 
     def __init__(self, report: Report, cancel: CancelToken) -> None:
@@ -75,6 +87,7 @@ class _Monitor:
         self.outer_iterations = 0
 
     def watch(self, iteration: int, cost: float, violation: float) -> bool:
+        """Pass on one step of a solve; False when it is to stop."""
         self._report(self.outer_iterations, self.steps + iteration, cost, violation)
         return not self._cancel.is_set()
 
@@ -126,7 +139,11 @@ class _Frozen:
 
     @classmethod
     def at(
-        cls, problem: Problem, values: Floats, earlier: Views | None, margins: Margins
+        cls,
+        problem: Problem,
+        values: Floats,
+        earlier: Views | None,
+        margins: Margins,
     ) -> _Frozen:
         """Cast the rays at the unknowns (7 n,)."""
         state = problem.unknowns.state(values)
@@ -153,7 +170,7 @@ def _solve_frozen(
     penalty: float,
     level: _Level,
     radius: float,
-    monitor: _Monitor,
+    monitor: Monitor,
 ) -> tuple[Outcome, VisibilityCuts]:
     """Solve with the rays frozen; add a visibility cut for each assigned view that gets hidden."""
     problem, assigned = frozen.problem, frozen.seen.assigned
@@ -191,12 +208,13 @@ def _run_level(
     values: Floats,
     radius: float,
     earlier: Views | None,
-    monitor: _Monitor,
+    monitor: Monitor,
 ) -> _LevelResult:
     """Outer iterations on one set of points until they settle; the best network of them all."""
     demands, cuts = _Demands(), VisibilityCuts.none()
     frozen = _Frozen.at(problem, values, earlier, demands.margins)
-    best: tuple[Floats, Merit, Outcome] | None = None
+    best = _untouched(frozen, values, level)
+    before: Merit | None = None
     why = f"the limit of {MAX_OUTER_ITERATIONS} outer iterations was reached"
     for _ in range(MAX_OUTER_ITERATIONS):
         monitor.outer_iterations += 1
@@ -209,8 +227,7 @@ def _run_level(
             problem = with_points(problem, judged.missed)
         frozen = _Frozen.at(problem, outcome.values, frozen.seen, demands.margins)
         now = merit(problem, outcome.values, frozen.seen, frozen.rows, level.bounds, shortfall)
-        before = None if best is None else best[1]
-        if now.better_than(before):
+        if now.better_than(None if best is None else best[1]):
             best = (outcome.values, now, outcome)
         if outcome.stopped:
             why = outcome.why
@@ -218,9 +235,24 @@ def _run_level(
         if before is not None and not _worth_another(before, now):
             why = f"another outer iteration gained less than {SETTLED:g} of the cost"
             break
+        before = best[1] if best is not None else now
         values, radius = outcome.values, 0.3 * FIRST_RADIUS
     assert best is not None  # noqa: S101 - the loop runs at least once
     return _LevelResult(*best, why, frozen.seen, demands)
+
+
+def _untouched(
+    frozen: _Frozen, values: Floats, level: _Level
+) -> tuple[Floats, Merit, Outcome] | None:
+    """The start itself where it meets the limits: nothing worse than it is returned."""
+    problem = frozen.problem
+    judged = judge(problem, problem.unknowns.state(values))
+    shortfall = max(0.0, judged.shortfall - level.tolerated)
+    now = merit(problem, values, frozen.seen, frozen.rows, level.bounds, shortfall)
+    if not now.feasible:
+        return None
+    why = "no outer iteration found anything better than the start"
+    return values, now, Outcome(values, [], np.inf, now.violation, 0, False, False, why)
 
 
 def _worth_another(before: Merit, now: Merit) -> bool:
@@ -243,12 +275,11 @@ def thinned(problem: Problem, seed: int) -> tuple[Problem, Ints] | None:
 
 
 def run_start(problem: Problem, report: Report, cancel: CancelToken, seed: int = 0) -> StartResult:
-    """Optimise from the problem's own cameras as the start."""
+    """Optimise from the problem's own cameras as the start, which may be far from any optimum."""
     values = problem.start_values()
     bounds = unknown_bounds(problem, problem.anchor_values())
-    state = problem.unknowns.state(values)
-    scale = covariance_cost(problem, views(problem, state)).typical(state)
-    monitor = _Monitor(report, cancel)
+    scale = cost_scale(problem, values)
+    monitor = Monitor(report, cancel)
     radius, earlier = FIRST_RADIUS, None
     coarse = thinned(problem, seed)
     if coarse is not None:
@@ -261,6 +292,10 @@ def run_start(problem: Problem, report: Report, cancel: CancelToken, seed: int =
         found = _run_level(problem, _Level(bounds, scale, 1e-4), values, radius, earlier, monitor)
     else:
         found = replace(found, merit=Merit(np.inf, 1.0, np.inf))
+    return _result(found, monitor)
+
+
+def _result(found: _LevelResult, monitor: Monitor) -> StartResult:
     return StartResult(
         found.values,
         found.merit,

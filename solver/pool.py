@@ -18,6 +18,7 @@ from threadpoolctl import threadpool_limits
 
 from common.errors import CancelledError
 from common.progress import CancelToken
+from solver.near_optimum import run_near
 from solver.outer_loop import Report, StartResult, run_start
 from solver.problem import Problem
 
@@ -27,12 +28,16 @@ _POLL_S = 0.05
 
 @dataclass(frozen=True, eq=False)
 class StartJob:
-    """One start to be optimised. Picklable, so that any executor may run it."""
+    """One start to be optimised. Picklable, so that any executor may run it.
+
+    ``near``: the start was chosen so well that only short moves are wanted.
+    """
 
     index: int
     kind: str
     problem: Problem
     seed: int
+    near: bool = False
 
 
 @contextmanager
@@ -72,6 +77,8 @@ def _die_with(parent: BaseProcess) -> None:
 def solve(job: StartJob, report: Report, cancel: CancelToken) -> StartResult:
     """Run one start on one BLAS thread, so that it gives the same bits wherever it runs."""
     with threadpool_limits(1):
+        if job.near:
+            return run_near(job.problem, report, cancel)
         return run_start(job.problem, report, cancel, job.seed)
 
 

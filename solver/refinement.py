@@ -7,7 +7,7 @@ from threadpoolctl import threadpool_limits
 from common.progress import CancelToken
 from solver.constraints.builders.coverage import cut_constraints
 from solver.coverage.cuts import VisibilityCuts, cuts_for_hidden, opening_directions
-from solver.coverage.views import views, with_points
+from solver.coverage.views import FAR, views, with_points
 from solver.formulation import COVERAGE, candidate_constraints, covariance_cost, unknown_bounds
 from solver.nlp.program import NonlinearProgram
 from solver.nlp.sqp import Outcome, minimise
@@ -16,6 +16,7 @@ from solver.problem import Problem
 
 _RADIUS = 0.02
 _MAX_STEPS = 120
+_MAX_STEPS_NEAR = 40
 _TIGHT = 1e-6
 
 
@@ -24,7 +25,7 @@ def refine(problem: Problem, result: StartResult, cancel: CancelToken) -> Outcom
     with threadpool_limits(1):
         problem, values = with_points(problem, result.added_points), result.values
         state = problem.unknowns.state(values)
-        seen = views(problem, state, None, result.margins)
+        seen = views(problem, state, None, result.margins, result.reach)
         opening = opening_directions(problem, state, seen.assigned)
         cost = covariance_cost(problem, seen, covariance_cost(problem, seen).typical(state))
         rows = candidate_constraints(problem, state, seen)
@@ -42,7 +43,7 @@ def refine(problem: Problem, result: StartResult, cancel: CancelToken) -> Outcom
                 tolerance=_TIGHT,
                 gain_tolerance=1e-13,
                 known=known,
-                max_iterations=_MAX_STEPS,
+                max_iterations=_MAX_STEPS if result.reach == FAR else _MAX_STEPS_NEAR,
                 radius=_RADIUS,
             )
             found, known = outcome.values, outcome.multipliers

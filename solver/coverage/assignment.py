@@ -72,6 +72,7 @@ def assign_views(
     fixed: Bools,
     spare: float = 0.0,
     earlier: AssignedViews | None = None,
+    farthest_deg: float = FARTHEST_DEG,
 ) -> AssignedViews:
     """Promise each point its wanted views to the cameras that see it best, or come nearest.
 
@@ -92,6 +93,6 @@ def assign_views(
     # Fixed cameras come first where they see the point and not at all where they do not.
     order = np.where(fixed[:, None], np.where(kept, -1e3, np.inf), deficit_deg)
     rank = np.argsort(np.argsort(order, axis=0, kind="stable"), axis=0)
-    chosen = (rank < required) & ~fixed[:, None] & (order < FARTHEST_DEG)
+    chosen = (rank < required) & ~fixed[:, None] & (order < farthest_deg)
     camera, point = np.nonzero(chosen)
     return AssignedViews(camera, point, kept[camera, point])

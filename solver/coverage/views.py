@@ -9,15 +9,32 @@ import numpy as np
 from geometry.arrays import Bools, Floats, Ints
 from geometry.camera import RigCamera
 from geometry.surface import SurfacePoints
-from solver.coverage.assignment import AssignedViews, Margins, assign_views
+from solver.coverage.assignment import FARTHEST_DEG, AssignedViews, Margins, assign_views
 from solver.coverage.visibility import Visibility, cast_rays, cosines, tangent_planes
 from solver.problem import Problem
 from solver.variables import NetworkState
 
 FIRST_MARGINS = Margins()
-_ABOUT_TO_BE_SEEN_DEG = 15.0
-"""How far beyond the limit of incidence points are framed: about what a camera swings by in an
-outer iteration. With less, each finds new points just outside the frame."""
+
+
+@dataclass(frozen=True)
+class Reach:
+    """How far cameras are expected to move in an outer iteration.
+
+    A free camera has to keep points in frame and in focus up to ``framed_deg`` past the limit of
+    incidence. With less, each iteration finds new points just outside the frame; with more,
+    cameras stand back for points that they will never see. ``hidden`` ones, too, or only those
+    with a free line of sight. Views up to ``assigned_deg`` from being possible may be assigned.
+    """
+
+    framed_deg: float
+    hidden: bool
+    assigned_deg: float
+
+
+FAR = Reach(15.0, hidden=True, assigned_deg=FARTHEST_DEG)
+NEAR = Reach(1.0, hidden=False, assigned_deg=2.0)
+NOWHERE = Reach(0.0, hidden=False, assigned_deg=0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +80,7 @@ def views(
     state: NetworkState,
     earlier: Views | None = None,
     margins: Margins = FIRST_MARGINS,
+    reach: Reach = FAR,
 ) -> Views:
     """Cast all rays and decide which views to assign.
 
@@ -85,12 +103,14 @@ def views(
         if camera.fixed:
             seen[i] &= in_frame(camera, source.points_mm)
     fixed = np.array([c.fixed for c in problem.cameras])
-    framed = _facing(problem, state, min(limit + _ABOUT_TO_BE_SEEN_DEG, 90.0))
+    framed = _to_be_framed(problem, state, reach)
     before = None
     if earlier is not None:
         framed, before = framed | earlier.framed, earlier.assigned
     deficits = _deficits(problem, state, found, seen, margins.angle_deg)
-    assigned = assign_views(problem.limits.coverage.tiers, deficits, fixed, margins.share, before)
+    assigned = assign_views(
+        problem.limits.coverage.tiers, deficits, fixed, margins.share, before, reach.assigned_deg
+    )
     return Views(seen, framed, assigned, margins.angle_deg)
 
 
@@ -155,14 +175,20 @@ def with_points(problem: Problem, missed: Ints) -> Problem:
     )
 
 
-def _facing(problem: Problem, state: NetworkState, limit_deg: float) -> Bools:
-    """Check points (n, q) whose normals are within the limit of the ray, in any head position."""
+def _to_be_framed(problem: Problem, state: NetworkState, reach: Reach) -> Bools:
+    """Check points (n, q) that may be seen in some head position."""
     source = problem.subject.check_points
-    least = np.cos(np.radians(limit_deg))
+    limit = min(problem.limits.incidence.ray_max_deg + reach.framed_deg, 90.0)
+    centres = centres_mm(problem, state)
     out = np.zeros((problem.count, len(source)), dtype=np.bool_)
-    for i, centre in enumerate(centres_mm(problem, state)):
-        for position in problem.visibility_positions:
-            out[i] |= cosines(source, position.eye_seen_by_head(centre)) > least
+    for position in problem.visibility_positions:
+        if reach.hidden:
+            for i, centre in enumerate(centres):
+                eye = position.eye_seen_by_head(centre)
+                out[i] |= cosines(source, eye) > np.cos(np.radians(limit))
+        else:
+            occluder = problem.subject.occluder
+            out |= cast_rays(source, occluder, centres, limit, (position,)).seen
     return out
 
 

@@ -94,7 +94,8 @@ def _outside(problem: Problem, state: NetworkState, i: int, zone: Zone) -> Candi
     )
 
 
-def _zones(problem: Problem, state: NetworkState) -> list[CandidateConstraints]:
+def zone_constraints(problem: Problem, state: NetworkState) -> list[CandidateConstraints]:
+    """Bodies inside one allowed zone, the nearest, and outside all forbidden ones."""
     zones = problem.limits.zones
     out = []
     for i, camera in enumerate(problem.cameras):
@@ -179,5 +180,9 @@ def _sight_lines(problem: Problem, state: NetworkState) -> list[CandidateConstra
 
 def body_constraints(problem: Problem, state: NetworkState) -> list[CandidateConstraints]:
     """All candidate rows about bodies."""
-    rows = _zones(problem, state) + _collisions(problem, state) + _sight_lines(problem, state)
+    rows = (
+        zone_constraints(problem, state)
+        + _collisions(problem, state)
+        + _sight_lines(problem, state)
+    )
     return [r for r in rows if r.block.rows]

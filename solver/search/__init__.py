@@ -1,0 +1,1 @@
+"""Global search: networks chosen among candidate poses whose information is computed once."""

@@ -1,0 +1,205 @@
+"""Candidate poses all around the subject, with what each sees and how much it would tell."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial import ConvexHull, QhullError
+
+from common.errors import CancelledError
+from common.progress import CancelToken, NeverCancelled
+from geometry.arrays import Bools, Floats
+from geometry.camera import Camera, RigCamera
+from geometry.frames import Pose, look_at_rotation
+from geometry.subject import Subject
+from geometry.surface import SurfacePoints
+from solver.constraints.builders.bodies import zone_constraints
+from solver.coverage.views import NEAR, in_frame
+from solver.coverage.visibility import cast_rays
+from solver.information import ray_information
+from solver.limits import Limits
+from solver.motion import visibility_positions
+from solver.problem import Problem, camera_at
+from solver.starts import fitting_distance
+
+STEP_DEG = 6.0
+"""Angle between neighbouring candidate directions: finer ones are left to the continuous solve."""
+
+WIDEST_DEG = 80.0
+"""Candidates stand up to this far from the mean normal of the subject."""
+
+MOST_POINTS = 500
+"""Check points that the search weighs; the continuous solve and the evaluation use all."""
+
+_LEAST_SEEN = 3
+_ROOM = 1.01
+"""A candidate stands this much farther than it must, so that a solve begins inside the limits."""
+
+
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """Cameras that could stand somewhere, the rig's fixed ones last.
+
+    ``information`` (m, 6, p) of each camera's ray to each point, in 1/mm2 (xx, yy, zz, xy, xz,
+    yz), zero where it does not see it; ``seen`` (m, p); ``position_mm`` (m, 3); ``distance_mm``
+    (m,) to the centroid; ``fixed`` how many of the last are there already.
+    """
+
+    cameras: tuple[RigCamera, ...]
+    information: Floats
+    seen: Bools
+    prior: float
+    position_mm: Floats
+    distance_mm: Floats
+    fixed: int
+
+    def __len__(self) -> int:
+        return len(self.cameras)
+
+    @property
+    def base_height(self) -> Floats:
+        """Base/height ratio (m, m) of all pairs (Eq 9)."""
+        gap = self.position_mm[:, None] - self.position_mm[None]
+        height = self.distance_mm[:, None] + self.distance_mm[None]
+        return np.asarray(2.0 * np.linalg.norm(gap, axis=2) / height)
+
+    @property
+    def gap_mm(self) -> Floats:
+        """Distances (m, m) of the projection centres."""
+        return np.asarray(
+            np.linalg.norm(self.position_mm[:, None] - self.position_mm[None], axis=2)
+        )
+
+    def of_points(self, every: int) -> Candidates:
+        """The same cameras weighed on every so many of the points."""
+        return replace(
+            self, information=self.information[:, :, ::every], seen=self.seen[:, ::every]
+        )
+
+
+def directions(facing: Floats, step_deg: float = STEP_DEG) -> Floats:
+    """Unit vectors (m, 3) about ``facing`` (3,), ``step_deg`` apart, up to ``WIDEST_DEG`` away.
+
+    Rings of latitude about ``facing``, so that no direction is favoured.
+    """
+    side = np.cross(facing, [0.0, 0.0, 1.0])
+    if np.linalg.norm(side) < 1e-6:
+        side = np.array([1.0, 0.0, 0.0])
+    side /= np.linalg.norm(side)
+    up = np.cross(side, facing)
+    out = [facing]
+    for away in np.radians(np.arange(step_deg, WIDEST_DEG + 1e-9, step_deg)):
+        count = round(2.0 * np.pi * np.sin(away) / np.radians(step_deg))
+        turn = 2.0 * np.pi * np.arange(count) / count
+        ring = np.cos(turn)[:, None] * side + np.sin(turn)[:, None] * up
+        out += list(np.cos(away) * facing + np.sin(away) * ring)
+    return np.array(out)
+
+
+def candidates(
+    subject: Subject,
+    camera: Camera,
+    limits: Limits,
+    fixed: tuple[RigCamera, ...] = (),
+    cancel: CancelToken | None = None,
+    step_deg: float = STEP_DEG,
+) -> Candidates:
+    """Cameras around the subject, each as near as frame and focus allow for what it sees.
+
+    They aim at the centroid, level or upright, whichever lets them stand closer. Those that a
+    zone forbids are left out. Raises :class:`CancelledError` soon after ``cancel`` is set.
+    """
+    points = _thinned(subject.check_points, MOST_POINTS)
+    middle = subject.design_points.centroid_mm
+    facing = subject.design_points.normals.mean(axis=0)
+    length = float(np.linalg.norm(facing))
+    outward = directions(facing / length if length > 1e-6 else np.array([0.0, -1.0, 0.0]), step_deg)
+    far = limits.stand_off.max_mm or 10.0 * subject.design_points.radius_mm
+    guess = min(far, max(limits.stand_off.min_mm or 0.0, 6.0 * subject.design_points.radius_mm))
+    token = cancel or NeverCancelled()
+    found: list[RigCamera] = []
+    for direction in outward:
+        if token.is_set():
+            raise CancelledError
+        # A little beyond the limit of incidence: what a short move would bring into view.
+        eye = (middle + guess * direction)[None]
+        sees = _sight(subject.check_points, subject, limits, eye, NEAR.framed_deg)[0]
+        if sees.sum() < _LEAST_SEEN:
+            continue
+        corners = _corners(subject.check_points.points_mm[sees])
+        pose = _pose(camera, limits, corners, direction, middle)
+        found.append(camera_at(camera, f"at{len(found)}", pose, corners))
+    found = _where_allowed(subject, limits, found)
+    whole = replace(subject, design_points=points)
+    return _weighed(whole, limits, (*found, *fixed), len(fixed), middle)
+
+
+def _thinned(points: SurfacePoints, most: int) -> SurfacePoints:
+    """At most so many of the points, evenly through their order, which is random."""
+    step = max(1, len(points) // most)
+    return points.subset(np.arange(0, len(points), step))
+
+
+def _corners(points_mm: Floats) -> Floats:
+    """The corners of the points' convex hull: what frame and focus are decided by."""
+    try:
+        return np.asarray(points_mm[ConvexHull(points_mm).vertices])
+    except (QhullError, ValueError):
+        return points_mm
+
+
+def _pose(camera: Camera, limits: Limits, points_mm: Floats, away: Floats, middle: Floats) -> Pose:
+    level, upright = (
+        fitting_distance(camera, limits, points_mm, -away, roll, middle) for roll in (0.0, 90.0)
+    )
+    roll = 90.0 if upright < 0.99 * level else 0.0
+    distance = _ROOM * (upright if roll else level)
+    low, high = limits.stand_off.min_mm or 0.0, limits.stand_off.max_mm or np.inf
+    distance = float(np.clip(distance, low, high))
+    return Pose(middle + distance * away, look_at_rotation(np.zeros(3), -away, roll))
+
+
+def _sight(
+    points: SurfacePoints,
+    subject: Subject,
+    limits: Limits,
+    centres_mm: Floats,
+    beyond_deg: float = 0.0,
+) -> Bools:
+    """Which points (p) are seen from which centres (m, 3), head at rest and moved."""
+    positions = visibility_positions(limits.motion, subject.design_points.centroid_mm)
+    limit = min(limits.incidence.ray_max_deg + beyond_deg, 90.0)
+    return cast_rays(points, subject.occluder, centres_mm, limit, positions).seen
+
+
+def _where_allowed(subject: Subject, limits: Limits, cameras: list[RigCamera]) -> list[RigCamera]:
+    """The cameras whose bodies keep to the zones."""
+    if not cameras or not (limits.zones.allowed or limits.zones.forbidden):
+        return cameras
+    problem = Problem(subject, tuple(cameras), limits)
+    state = problem.unknowns.state(problem.start_values())
+    broken = np.zeros(len(cameras), dtype=np.bool_)
+    for rows in zone_constraints(problem, state):
+        who = rows.block.columns[:, 0] // 7
+        broken[who[rows.block.violation(state) > 0.0]] = True
+    return [c for c, out in zip(cameras, broken, strict=True) if not out]
+
+
+def _weighed(
+    subject: Subject, limits: Limits, cameras: tuple[RigCamera, ...], fixed: int, middle: Floats
+) -> Candidates:
+    if not cameras:
+        empty = np.zeros((0, 6, len(subject.design_points)))
+        return Candidates((), empty, empty[:, 0] > 0.0, 0.0, np.zeros((0, 3)), np.zeros(0), 0)
+    problem = Problem(subject, cameras, limits)
+    centres = np.stack([c.pose.position_rig_mm for c in cameras])
+    seen = _sight(subject.design_points, subject, limits, centres)
+    for i, camera in enumerate(cameras):
+        seen[i] &= in_frame(camera, subject.design_points.points_mm)
+    state = problem.unknowns.state(problem.start_values())
+    weight = seen * problem.ray_weight[:, None]
+    information = ray_information(state, problem.points, weight) / problem.length_mm**2
+    distance = np.linalg.norm(centres - middle, axis=1)
+    prior = problem.prior / problem.length_mm**2
+    return Candidates(cameras, information, seen, prior, centres, distance, fixed)

@@ -1,0 +1,141 @@
+"""Networks of candidates: what one costs, growing it by the best view, exchanging its views."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from geometry.arrays import Bools, Floats, Ints
+from solver.limits import Limits
+from solver.search.candidates import Candidates
+
+_COVERAGE_WEIGHT = 30.0
+"""A share of points that lack views costs this much times that share, in units of the cost."""
+
+
+def covariance_norms(entries: Floats) -> Floats:
+    """Frobenius norms (...) of the inverses of symmetric matrices given by entries (..., 6).
+
+    The six are on the axis before the last: entries (..., 6, p) give (..., p). By cofactors:
+    a hundred thousand 3 x 3 inverses at a time have no use for pivots.
+    """
+    xx, yy, zz, xy, xz, yz = np.moveaxis(entries, -2, 0)
+    a, b, c = yy * zz - yz * yz, xx * zz - xz * xz, xx * yy - xy * xy
+    d, e, f = xz * yz - xy * zz, xy * yz - xz * yy, xy * xz - yz * xx
+    determinant = xx * a + xy * d + xz * e
+    size = a * a + b * b + c * c + 2.0 * (d * d + e * e + f * f)
+    return np.asarray(np.sqrt(size) / determinant)
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """Candidates under limits: which networks are allowed, and what each costs.
+
+    A network is an array of candidate indices. Its score is a pair: how many rules about pairs
+    of cameras it breaks, then the mean norm of the covariances (mm2), raised where coverage
+    falls short of its tiers.
+    """
+
+    candidates: Candidates
+    limits: Limits
+
+    @cached_property
+    def too_close(self) -> Bools:
+        """Pairs (m, m) that no network may hold: base/height or bodies."""
+        limit, pool = self.limits.base_height, self.candidates
+        ratio = pool.base_height
+        out = np.zeros(ratio.shape, dtype=np.bool_)
+        if limit.min is not None:
+            out |= ratio < limit.min
+        if limit.max is not None:
+            out |= ratio > limit.max
+        if self.limits.body_clearance_mm is not None:
+            reach = np.array([np.linalg.norm(c.camera.body.size_mm) / 2.0 for c in pool.cameras])
+            out |= pool.gap_mm < reach[:, None] + reach[None] + self.limits.body_clearance_mm
+        np.fill_diagonal(out, val=True)
+        return out
+
+    @cached_property
+    def near(self) -> Bools | None:
+        """Pairs (m, m) that are neighbours in the sense of the limits; None without that limit."""
+        limit = self.limits.base_height.neighbour_max
+        if limit is None:
+            return None
+        out = self.candidates.base_height <= limit
+        np.fill_diagonal(out, val=False)
+        return np.asarray(out)
+
+    def score(self, network: Ints) -> tuple[int, float]:
+        """Rules broken and cost of one network."""
+        rest, last = network[:-1], network[-1]
+        broken, cost = self.scores_with_each(rest)
+        return int(broken[last]), float(cost[last])
+
+    def scores_with_each(self, rest: Ints) -> tuple[Ints, Floats]:
+        """Rules broken (m,) and cost (m,) of the network ``rest`` with each candidate added."""
+        pool = self.candidates
+        base = pool.information[rest].sum(axis=0)
+        base[:3] += pool.prior
+        cost = covariance_norms(base[None] + pool.information).mean(axis=1)
+        return self._broken_with_each(rest), cost * self._shortfall_factor(rest)
+
+    def _broken_with_each(self, rest: Ints) -> Ints:
+        among = self.too_close[np.ix_(rest, rest)]
+        inside = int(np.triu(among, 1).sum())
+        broken = inside + self.too_close[:, rest].sum(axis=1)
+        if self.near is not None and len(rest):
+            lonely = rest[~self.near[np.ix_(rest, rest)].any(axis=1)]
+            broken = broken + (~self.near[:, lonely]).sum(axis=1)
+            broken = broken + ~self.near[:, rest].any(axis=1)
+        return np.asarray(broken)
+
+    def _shortfall_factor(self, rest: Ints) -> Floats:
+        """By how much (m,) the cost is raised for views that are lacking."""
+        pool = self.candidates
+        count = pool.seen[rest].sum(axis=0)[None] + pool.seen
+        lack = np.zeros(len(pool))
+        for tier in self.limits.coverage.tiers:
+            lack = np.maximum(lack, tier.share - (count >= tier.views).mean(axis=1))
+        return np.asarray(1.0 + _COVERAGE_WEIGHT * lack)
+
+    def best_addition(self, rest: Ints) -> int:
+        """The free candidate that helps a network most."""
+        return _least(*self.scores_with_each(rest), len(self.candidates) - self.candidates.fixed)
+
+    @property
+    def fixed(self) -> Ints:
+        """Indices of the cameras that are there already."""
+        m = len(self.candidates)
+        return np.arange(m - self.candidates.fixed, m)
+
+    def grown(self, network: Ints, count: int) -> Ints:
+        """A network grown to ``count`` free cameras, each time by the view that helps most."""
+        while len(network) < count + self.candidates.fixed:
+            network = np.append(network, self.best_addition(network))
+        return network
+
+    def exchanged(self, network: Ints, passes: int = 12) -> Ints:
+        """Each free camera in turn put where it helps most, until none moves."""
+        network = network.copy()
+        free_candidates = len(self.candidates) - self.candidates.fixed
+        best = self.score(network)
+        for _ in range(passes):
+            moved = False
+            for k in np.flatnonzero(network < free_candidates):
+                rest = np.delete(network, k)
+                broken, cost = self.scores_with_each(rest)
+                at = _least(broken, cost, free_candidates)
+                found = int(broken[at]), float(cost[at])
+                if found < (best[0], best[1] * (1.0 - 1e-9)):
+                    network[k], best, moved = at, found, True
+            if not moved:
+                break
+        return network
+
+
+def _least(broken: Ints, cost: Floats, free: int) -> int:
+    """Index of the least broken, then cheapest of the first ``free``."""
+    order = np.lexsort((cost[:free], broken[:free]))
+    return int(order[0])
