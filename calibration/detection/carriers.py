@@ -9,6 +9,7 @@ import numpy as np
 from calibration.detection import opencv
 from calibration.detection.detections import Point
 from calibration.detection.gates import Gates, Rejection, Rule
+from calibration.detection.planes import straightened
 from calibration.observations import Carrier
 from calibration.targets.kinds import CharucoPlate, TargetPlan
 from geometry.arrays import Bools, Floats
@@ -58,7 +59,8 @@ def _agreeing(
     if size[1] < _FLAT * size[0]:
         return everything
     if size[2] < _FLAT * size[0]:
-        found = opencv.homography(away @ axes[:2].T, pixels, limit_px)
+        plane = away @ axes[:2].T
+        found = opencv.homography(plane, straightened(plane, pixels, size_px), limit_px)
         mask = None if found is None else found[1]
     elif len(rows) >= _ENOUGH_IN_SPACE:
         mask = opencv.pose_agreement(nominal, pixels, size_px, limit_px)

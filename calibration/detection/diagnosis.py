@@ -13,6 +13,7 @@ from calibration.detection.plates import LAYOUT_AGREEMENT, agreeing, believable,
 from calibration.detection.rings import mirrored_codes, ring_dots
 from calibration.detection.seeing import MarkerSearch
 from calibration.targets.kinds import (
+    MOST_SQUARES,
     CharucoPlate,
     MarkerCarrier,
     RingCarrier,
@@ -66,6 +67,8 @@ def other_layout(plate: CharucoPlate, markers: Markers) -> PictureProblem:
     for columns in sorted(range(3, _MOST_COLUMNS), key=lambda c: c != plate.rows):
         for legacy in (plate.legacy, not plate.legacy):
             trial = _variant(plate, columns, legacy)
+            if trial is None:
+                continue
             own, _ = plane_markers(trial, markers)
             agreement = float(agreeing(trial, markers).mean()) if len(own) else 0.0
             if len(own) >= _ENOUGH_MARKERS and agreement > share:
@@ -97,15 +100,18 @@ def other_layout(plate: CharucoPlate, markers: Markers) -> PictureProblem:
     )
 
 
-def _variant(plate: CharucoPlate, columns: int, legacy: bool) -> CharucoPlate:
+def _variant(plate: CharucoPlate, columns: int, legacy: bool) -> CharucoPlate | None:
     """A plate of other columns with rows enough for all markers, first square white or black.
 
-    Only the parity of the rows matters to where a legacy pattern begins; even is taken.
+    Only the parity of the rows matters to where a legacy pattern begins; even is taken. None for
+    plates longer than any: so many markers on so few columns.
     """
     rows = plate.columns if columns == plate.rows else plate.rows
     rows = max(rows, -(-2 * (plate.columns * plate.rows) // columns) // 2)
     if columns not in (plate.columns, plate.rows) or (legacy and rows % 2):
         rows += rows % 2
+    if rows > MOST_SQUARES:
+        return None
     return CharucoPlate(
         plate.name,
         columns,

@@ -51,6 +51,8 @@ def dictionary_names() -> tuple[str, ...]:
 
 
 def _dictionary(name: str) -> Any:  # noqa: ANN401  OpenCV's own type, gone from no signature
+    # OpenCV spells some with a small h; files of others do, too.
+    name = name.upper()
     if name not in dictionary_names():
         raise InputError(
             "dictionary",

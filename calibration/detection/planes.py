@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.optimize import minimize
 
-from geometry.arrays import Floats
+from geometry.arrays import Bools, Floats
 
 
 def homographies(plane: Floats, pixels: Floats) -> Floats:
@@ -52,6 +53,80 @@ def mapped(matrix: Floats, places: Floats) -> tuple[Floats, Floats]:
     pixel = ends[:, :2] / ends[:, 2:]
     slope = matrix[:, :2, :2] - pixel[:, :, None] * matrix[:, 2:, :2]
     return pixel, slope / ends[:, 2:, None]
+
+
+LEAST_TO_STRAIGHTEN = 16
+BENDS = np.linspace(-0.9, 0.5, 29)
+BETTER = 0.5
+
+
+def straightened(plane: Floats, pixels: Floats, size_px: tuple[int, int]) -> Floats:
+    """Pixels (n, 2) of points of a plane (n, 2) as a lens without distortion would image them.
+
+    Two radial terms about the middle of the picture (the division model of Fitzgibbon 2001),
+    which wide lenses obey nearly; they are chosen by how well a homography fits then, and left out
+    where they do not halve what is left.
+    """
+    middle = (np.array(size_px) - 1.0) / 2.0
+    away = pixels - middle
+    squares = np.sum(away**2, axis=1) / np.sum(middle**2)
+    if len(plane) < LEAST_TO_STRAIGHTEN:
+        return pixels
+    costs = [_bent_cost(plane, away, 1.0 + bend * squares) for bend in BENDS]
+    best, step = float(BENDS[int(np.argmin(costs))]), float(BENDS[1] - BENDS[0])
+    near = best + step * np.linspace(-1.0, 1.0, 11)
+    fine = [_bent_cost(plane, away, 1.0 + bend * squares) for bend in near]
+    bend = float(near[int(np.argmin(fine))])
+    if min(fine) > BETTER * _bent_cost(plane, away, np.ones(len(away))):
+        return pixels
+
+    def cost(bends: Floats) -> float:
+        return _bent_cost(plane, away, 1.0 + bends[0] * squares + bends[1] * squares**2)
+
+    # One term alone leaves a pixel or two where the widest lenses see most aslant.
+    begin = np.array([[bend, 0.0], [bend + 0.1, -0.1], [bend, 0.1]])
+    both = minimize(
+        cost,
+        begin[0],
+        method="Nelder-Mead",
+        options={"maxfev": 120, "initial_simplex": begin},
+    ).x
+    return np.asarray(middle + away / (1.0 + both[0] * squares + both[1] * squares**2)[:, None])
+
+
+def _bent_cost(plane: Floats, away: Floats, share: Floats) -> float:
+    """What a homography leaves, median in pixels of the picture as it is."""
+    if share.min() < 0.05:
+        return float("inf")
+    straight, used = away / share[:, None], np.ones(len(away), dtype=bool)
+    off = np.zeros(len(away))
+    for _ in range(2):
+        matrix = homographies(plane[None, used], straight[None, used])
+        guess, _ = mapped(np.repeat(matrix, len(plane), axis=0), plane)
+        off = np.linalg.norm(guess - straight, axis=1) * share
+        # A few points out of their places must not choose the lens.
+        used = off <= np.quantile(off, 0.8)
+    return float(np.median(off))
+
+
+def grown(places: Floats, pixels: Floats, good: Bools, limit_px: float) -> Bools:
+    """More points (n,) that go on where the ``good`` ones lead, however the lens bends the plane.
+
+    Polynomials of the places (n, 2), second order and third where there are points enough.
+    """
+    span = np.ptp(places, axis=0).max()
+    x, y = ((places - places.mean(axis=0)) / span).T
+    terms = [np.ones_like(x), x, y, x * x, x * y, y * y]
+    third = [x**3, x * x * y, x * y * y, y**3]
+    while 12 <= good.sum() < len(good):
+        basis = np.stack(terms + (third if good.sum() >= 24 else []), axis=1)
+        answer = np.linalg.lstsq(basis[good], pixels[good], rcond=None)[0]
+        off = np.linalg.norm(basis @ answer - pixels, axis=1)
+        more = good | (off < limit_px)
+        if (more == good).all():
+            break
+        good = more
+    return good
 
 
 def neighbour_residuals(plane: Floats, pixels: Floats, count: int = 12) -> Floats:

@@ -11,7 +11,13 @@ from calibration.detection.detections import SIGMA_FLOOR_PX, Point
 from calibration.detection.gates import Gates, Rejection, Rule
 from calibration.detection.images import Picture
 from calibration.detection.opencv import Markers
-from calibration.detection.planes import homographies, mapped, neighbour_residuals
+from calibration.detection.planes import (
+    grown,
+    homographies,
+    mapped,
+    neighbour_residuals,
+    straightened,
+)
 from calibration.detection.saddle import GuardRule, Saddles, fit_saddles
 from calibration.detection.windows import square_windows
 from calibration.targets.kinds import CharucoPlate
@@ -115,8 +121,11 @@ def agreeing(plate: CharucoPlate, markers: Markers) -> Bools:
     middles = own.corners_px.mean(axis=1)
     sides = np.linalg.norm(own.corners_px - np.roll(own.corners_px, 1, axis=1), axis=2)
     # Lens distortion bends the plane; a marker out of place is off by a square or more.
-    found = opencv.homography(places, middles, 0.35 * float(np.median(sides)))
-    return np.zeros(len(own), dtype=bool) if found is None else found[1]
+    limit = 0.35 * float(np.median(sides))
+    found = opencv.homography(places, middles, limit)
+    if found is None:
+        return np.zeros(len(own), dtype=bool)
+    return grown(places, middles, found[1], limit)
 
 
 def believable(plate: CharucoPlate, markers: Markers) -> bool:
@@ -220,8 +229,31 @@ def _gated(
     for rule, measured, limit in rules:
         rows = np.flatnonzero(good)
         good[rows] = report.gate(guesses.only(rows), rule, measured[rows], limit)
-    good &= _in_plane(plate, guesses, saddles.pixel, good, gates, report)
+    straight = _straight(picture, plate, guesses, saddles.pixel, good, gates)
+    good &= _in_plane(plate, guesses, straight, good, gates, report)
     return [_point(plate, guesses, saddles, int(k)) for k in np.flatnonzero(good)]
+
+
+def _straight(
+    picture: Picture,
+    plate: CharucoPlate,
+    guesses: Guesses,
+    pixel: Floats,
+    good: Bools,
+    gates: Gates,
+) -> Floats:
+    """The corners as a lens without distortion would show them, where distortion matters."""
+    plane = plate.corner_grid_mm[guesses.numbers]
+    away = neighbour_residuals(plane[good], pixel[good]) if good.any() else np.zeros(0)
+    if not (away > _plane_limit(guesses, gates)[good]).any():
+        return pixel
+    straight = pixel.copy()
+    straight[good] = straightened(plane[good], pixel[good], picture.size_px)
+    return straight
+
+
+def _plane_limit(guesses: Guesses, gates: Gates) -> Floats:
+    return np.asarray(np.maximum(gates.plane_px, gates.plane_share * guesses.square_px) + 1e-9)
 
 
 def _clipped(picture: Picture, guesses: Guesses, half: int) -> Floats:
@@ -241,7 +273,7 @@ def _in_plane(
     """Corners that lie where their neighbours say; the worst goes, then all are asked anew."""
     good = good.copy()
     plane = plate.corner_grid_mm[guesses.numbers]
-    limit = np.maximum(gates.plane_px, gates.plane_share * guesses.square_px) + 1e-9
+    limit = _plane_limit(guesses, gates)
     while good.any():
         rows = np.flatnonzero(good)
         excess = neighbour_residuals(plane[rows], pixel[rows]) / limit[rows]

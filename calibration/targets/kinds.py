@@ -58,6 +58,9 @@ class Ruler:
         return self.measured_mm / self.drawn_mm
 
 
+MOST_SQUARES = 100
+
+
 @dataclass(frozen=True)
 class CharucoPlate:
     """A ChArUco plate: ``columns`` x ``rows`` squares, markers in the white ones.
@@ -83,10 +86,10 @@ class CharucoPlate:
 
     def __post_init__(self) -> None:
         _require(
-            min(self.columns, self.rows) >= 3 and max(self.columns, self.rows) <= 100,
+            min(self.columns, self.rows) >= 3 and max(self.columns, self.rows) <= MOST_SQUARES,
             "plate-squares",
             f"plate {self.name!r} has {self.columns} x {self.rows} squares",
-            "give 3 to 100 squares each way",
+            f"give 3 to {MOST_SQUARES} squares each way",
         )
         _require(
             np.isfinite(self.square_mm) and 0.0 < self.marker_mm < self.square_mm,

@@ -55,7 +55,7 @@ def calibrate(
 ) -> None:
     """Calibrate all cameras of a rig from pictures of targets.
 
-    Exit code: 0 done, 2 bad input, 130 interrupted.
+    Exit code: 0 done, 2 bad input, 4 not converged (do not use it), 130 interrupted.
 
     Example:  rigwright calibrate pictures --targets targets/targets.toml --out calibration
     """
@@ -63,7 +63,7 @@ def calibrate(
 
     from common.files.folders import new_folder
     from common.files.ownership import files_of
-    from service.cli.output import print_result_json
+    from service.cli.output import NOT_WELL, print_result_json
     from service.cli.pictures import TARGETS, picture_source
     from service.cli.running import one_line_errors, run_task
     from service.cli.tables import measurement_tables
@@ -88,6 +88,8 @@ def calibrate(
             shutil.copyfile(target_set, folder / TARGETS)
         if as_json:
             print_result_json(result, files_of(out))
-            return
-        measurement_tables.print_calibration(result)
-        print_files(files_of(out))
+        else:
+            measurement_tables.print_calibration(result)
+            print_files(files_of(out))
+    if not result.converged:
+        raise typer.Exit(NOT_WELL)
