@@ -34,25 +34,23 @@ HOMOGRAPHIES = {
 """They divide by the third coordinate of a map from plane to plane, which is no camera."""
 
 OWN_DIVISIONS = {
-    "calibration/adjustment/camera.py",
-    "calibration/adjustment/start/resection.py",
-    "calibration/targets/scenes.py",
     "solver/constraints/rays.py",
     "solver/constraints/table.py",
 }
 """Projections still to be taken from the camera model."""
 
-OWN_TERMS = {"calibration/adjustment/model.py"}
+OWN_TERMS: set[str] = set()
 """Distortion still to be taken from the camera model."""
 
 OPENCV = {
-    "calibration/adjustment/start/resection.py",
+    "calibration/adjustment/initialisation/resection.py",
     "calibration/detection/opencv.py",
+    "evaluation/reconstruction/depthmaps.py",
+    "evaluation/reconstruction/stereo.py",
+    "evaluation/reconstruction/views.py",
     "rig/acquisition/cameras/pixels.py",
     "rig/acquisition/cameras/workers/opencv_driver.py",
-    "rig/acquisition/session/pictures.py",
-    "rig/acquisition/synchrony/looks.py",
-    "rig/acquisition/synchrony/optical.py",
+    "rig/acquisition/imaging.py",
     "rig/acquisition/timingboard/reading.py",
     "rig/simulation/defocus.py",
     "rig/simulation/flats.py",

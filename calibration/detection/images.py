@@ -84,26 +84,40 @@ def picture_from(image: AnyImage, name: str = "the picture", order: str = "BGR")
 def read_picture(path: Path, name: str | None = None) -> Picture:
     """The picture in a file. Raises a one-line :class:`InputError` with its ``name``."""
     name = path.name if name is None else name
+    return decoded(_bytes_of(path, name), name)
+
+
+def read_colour(path: Path) -> AnyImage:
+    """The pixels in a file, (H, W) or (H, W, 3) RGB, 8 or 16 bits; errors as of a picture."""
+    image = _pixels(_bytes_of(path, path.name), path.name)
+    picture_from(image, path.name)  # what cannot be measured is refused in the same words
+    return image if image.ndim == 2 else np.ascontiguousarray(image[..., 2::-1])
+
+
+def _bytes_of(path: Path, name: str) -> bytes:
     try:
         if path.stat().st_size > LARGEST_BYTES:
             raise InputError("image-size", f"{name} is larger than a picture", _TAKEN)
-        data = path.read_bytes()
+        return path.read_bytes()
     except OSError as error:
         raise InputError(
             "image-read", f"{name} cannot be read ({error.strerror})", "check the path"
         ) from error
-    return decoded(data, name)
 
 
 def decoded(data: bytes, name: str) -> Picture:
     """The picture in an encoded file. Raises a one-line :class:`InputError` naming it."""
+    return picture_from(_pixels(data, name), name)
+
+
+def _pixels(data: bytes, name: str) -> AnyImage:
     _check_size(data, name)
     if data[:2] == b"\xff\xd8":
         _check_jpeg(data, name)
     image = opencv.decode(data) if data else None
     if image is None:
         raise InputError("image-format", f"{name} is not a picture that can be read", _TAKEN)
-    return picture_from(image, name)
+    return image
 
 
 @contextmanager

@@ -15,6 +15,7 @@ from service.cli.commands.cameras import cameras
 from service.cli.commands.capture import capture
 from service.cli.commands.catalogue import catalogue
 from service.cli.commands.check import check
+from service.cli.commands.compare import compare
 from service.cli.commands.demo import demo
 from service.cli.commands.design import design
 from service.cli.commands.evaluate import evaluate
@@ -22,6 +23,7 @@ from service.cli.commands.export import export
 from service.cli.commands.fake_trigger import fake_trigger
 from service.cli.commands.plan import plan
 from service.cli.commands.practice import practice
+from service.cli.commands.reconstruct import reconstruct
 from service.cli.commands.rig import rig
 from service.cli.commands.serve import serve
 from service.cli.commands.sessions import sessions
@@ -62,6 +64,7 @@ def _options(
 for command in (
     *(demo, design, evaluate, plan, catalogue, export),
     *(targets, calibrate, check, accept),
+    *(reconstruct, compare),
     *(practice, capture, cameras, fake_trigger, serve),
 ):
     app.command(command.__name__.replace("_", "-"))(command)

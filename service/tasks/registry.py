@@ -69,6 +69,20 @@ def _acceptance() -> Work[Any, Any]:
     return Work(ACCEPTANCE, acceptance)
 
 
+def _reconstruction() -> Work[Any, Any]:
+    from service.kinds.reconstruction import RECONSTRUCTION
+    from service.tasks.reconstructing import reconstruction
+
+    return Work(RECONSTRUCTION, reconstruction)
+
+
+def _comparison() -> Work[Any, Any]:
+    from service.kinds.comparison import COMPARISON
+    from service.tasks.comparing import comparison
+
+    return Work(COMPARISON, comparison)
+
+
 def _scan_import() -> Work[Any, Any]:
     from service.kinds.imports import SCAN_IMPORT
     from service.tasks.reading import import_scan
@@ -92,6 +106,8 @@ _WORK: dict[str, Callable[[], Work[Any, Any]]] = {
     "calibration": _calibration,
     "check": _check,
     "acceptance": _acceptance,
+    "reconstruction": _reconstruction,
+    "comparison": _comparison,
     "scan-import": _scan_import,
     "picture-import": _pictures_import,
 }

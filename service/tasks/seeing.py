@@ -39,7 +39,7 @@ def see(plan: TargetPlan, task: Task[RequestT, ResultT], running: Running) -> De
     running.report(Progress("reading the pictures", 0.0))
     require_opencv()
     with tempfile.TemporaryDirectory(prefix="pictures-", dir=task.folder.parent) as temporary:
-        pictures = _pictures(task, Path(temporary))
+        pictures = taken_pictures(task, Path(temporary))
 
         def within(inner: Progress, /) -> None:
             running.report(
@@ -59,7 +59,8 @@ def see(plan: TargetPlan, task: Task[RequestT, ResultT], running: Running) -> De
     return seen
 
 
-def _pictures(task: Task[RequestT, ResultT], temporary: Path) -> Sequence[Picture]:
+def taken_pictures(task: Task[RequestT, ResultT], temporary: Path) -> Sequence[Picture]:
+    """The pictures that a task was given; an archive is unpacked into ``temporary``."""
     if "pictures" in task.inputs:
         unpack(task.inputs["pictures"], temporary)
         return pictures_in_folder(temporary)

@@ -1,0 +1,1 @@
+"""Comparison of a cloud with a reference surface: signed distances, completeness, figures."""

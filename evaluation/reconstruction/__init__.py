@@ -1,0 +1,1 @@
+"""Dense reconstruction: from the pictures of one capture to points with their sigma."""

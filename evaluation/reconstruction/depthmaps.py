@@ -1,0 +1,216 @@
+"""The depth map of one reference camera: coarse pairs first, then patches over all views."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from evaluation.reconstruction.stereo import coarse_inverse_depth
+from evaluation.reconstruction.views import Singles, View
+from evaluation.reconstruction.volume import Volume
+from geometry.arrays import Bools, Floats
+
+COARSE_STRIDE = 2
+"""Patches of the half-size pictures start at every second pixel, so at every fourth of the full."""
+
+
+@dataclass(frozen=True)
+class Matching:
+    """How patches are matched.
+
+    ``half_width`` samples to each side of a patch's middle; ``stride_px`` between the middles;
+    ``steps`` Gauss-Newton steps at most; ``least_correlation`` below which a view is dropped.
+    """
+
+    half_width: int = 6
+    stride_px: int = 2
+    steps: int = 5
+    least_correlation: float = 0.8
+
+
+@dataclass(frozen=True, eq=False)
+class DepthMap:
+    """What one reference camera measured on a grid of its pixels, each (h, w), NaN where nothing.
+
+    ``inverse_depth`` (1/mm) along the camera's axis at pixels ``stride * (column, row)`` with its
+    ``variance`` (1/mm2) and slopes per pixel (h, w, 2); ``correlation`` mean over the views used,
+    ``views`` how many they are, the reference not counted.
+    """
+
+    reference: View
+    stride_px: int
+    inverse_depth: Floats
+    slopes: Floats
+    variance: Floats
+    correlation: Singles
+    views: NDArray[np.int8]
+
+
+def coarse_start(reference: View, partners: Sequence[View], volume: Volume) -> Singles:
+    """Inverse depth from pairs: the first partner's where it knows, then the next one's."""
+    out: Singles | None = None
+    for partner in partners:
+        found = coarse_inverse_depth(reference, partner, volume)
+        out = found if out is None else np.where(np.isfinite(out), out, found)
+    if out is None:
+        return np.full(reference.grey.shape, np.nan, dtype=np.float32)
+    return out
+
+
+def relations(reference: View, others: Sequence[View]) -> tuple[Floats, Floats]:
+    """``M`` (K, 3, 3) and ``m`` (K, 3) of the kernel's formula for each other view."""
+    back = reference.pose.rotation_rig_to_camera.T @ np.linalg.inv(reference.matrix)
+    turn = [v.matrix @ v.pose.rotation_rig_to_camera for v in others]
+    base = [reference.pose.position_rig_mm - v.pose.position_rig_mm for v in others]
+    return np.array([t @ back for t in turn]), np.array(
+        [t @ b for t, b in zip(turn, base, strict=True)]
+    )
+
+
+def refined(
+    reference: View,
+    others: Sequence[View],
+    start: Floats,
+    slopes: Floats,
+    stride_px: int,
+    matching: Matching,
+) -> DepthMap:
+    """Patches at every ``stride_px`` pixels where ``start`` (h, w) knows an inverse depth.
+
+    ``slopes`` (h, w, 2) change of the inverse depth per pixel along columns and rows.
+    """
+    from evaluation.reconstruction.kernel import FIELDS, refine
+
+    height, width = start.shape
+    rows, columns = np.mgrid[0:height, 0:width] * stride_px
+    reach = matching.half_width
+    inside = (
+        np.isfinite(start)
+        & (columns >= reach)
+        & (rows >= reach)
+        & (columns < reference.grey.shape[1] - reach)
+        & (rows < reference.grey.shape[0] - reach)
+    )
+    inside &= ~reference.clipped[rows, columns]
+    pixels = np.stack([columns[inside], rows[inside]], axis=1).astype(np.int64)
+    firsts = np.column_stack([start[inside], slopes[inside]]).astype(np.float64)
+    matrices, shifts = relations(reference, others)
+    found = refine(
+        reference.grey,
+        np.stack([v.grey for v in others]),
+        matrices,
+        shifts,
+        pixels,
+        firsts,
+        matching.half_width,
+        1,
+        matching.steps,
+        matching.least_correlation,
+    )
+    full = np.full((height, width, FIELDS), np.nan)
+    full[inside] = found
+    good = inside & (full[..., 3] > 0.0) & (full[..., 5] >= 1.0) & (full[..., 6] < 0.5)
+    full[~good] = np.nan
+    return DepthMap(
+        reference,
+        stride_px,
+        full[..., 0],
+        full[..., 1:3],
+        full[..., 3],
+        full[..., 4].astype(np.float32),
+        np.nan_to_num(full[..., 5], nan=0.0).astype(np.int8),
+    )
+
+
+def first_slopes(inverse_depth: Floats, spacing_px: float) -> tuple[Floats, Floats]:
+    """A smoothed inverse depth (h, w) and its slopes per pixel (h, w, 2), gaps kept as NaN."""
+    known = np.isfinite(inverse_depth)
+    weight = ndimage.gaussian_filter(known.astype(np.float64), 1.5)
+    filled = ndimage.gaussian_filter(np.where(known, inverse_depth, 0.0), 1.5)
+    smooth = np.where(known, filled / np.maximum(weight, 1e-9), np.nan)
+    dy, dx = np.gradient(smooth, spacing_px)
+    slopes = np.nan_to_num(np.stack([dx, dy], axis=-1))
+    return smooth, slopes
+
+
+def steady(map_: DepthMap, tolerance_px: float, scale_px_mm: float) -> Bools:
+    """Where a patch agrees with the median of its neighbours, (h, w).
+
+    ``scale_px_mm`` turns inverse depth into pixels of the widest partner (focal length times
+    base). A lone patch that went elsewhere is a blunder; a surface is not.
+    """
+    known = np.isfinite(map_.inverse_depth)
+    value = np.where(known, map_.inverse_depth, 0.0).astype(np.float32)
+    middle = cv2.medianBlur(value, 5)
+    return np.asarray(known & (np.abs(value - middle) * scale_px_mm <= tolerance_px))
+
+
+def grown_start(map_: DepthMap, steps: int) -> tuple[Floats, Floats]:
+    """Start values for the gaps of a map: the plane of the nearest patch within ``steps``.
+
+    NaN where there is a patch already or none is near.
+    """
+    known = np.isfinite(map_.inverse_depth)
+    distance, (iy, ix) = ndimage.distance_transform_edt(~known, return_indices=True)
+    rows, columns = np.indices(known.shape)
+    slope = map_.slopes[iy, ix]
+    value = (
+        map_.inverse_depth[iy, ix]
+        + slope[..., 0] * (columns - ix) * map_.stride_px
+        + slope[..., 1] * (rows - iy) * map_.stride_px
+    )
+    near = ~known & (distance <= steps)
+    return np.where(near, value, np.nan), slope
+
+
+def merged(map_: DepthMap, more: DepthMap) -> DepthMap:
+    """Both maps of one reference: the first where it knows, else the second."""
+    known = np.isfinite(map_.inverse_depth)
+    return replace(
+        map_,
+        inverse_depth=np.where(known, map_.inverse_depth, more.inverse_depth),
+        slopes=np.where(known[..., None], map_.slopes, more.slopes),
+        variance=np.where(known, map_.variance, more.variance),
+        correlation=np.where(known, map_.correlation, more.correlation),
+        views=np.where(known, map_.views, more.views).astype(np.int8),
+    )
+
+
+def upsampled(
+    map_: DepthMap, keep: Bools, shape: tuple[int, int], stride_px: int
+) -> tuple[Floats, Floats]:
+    """Start values for the next level from the planes of this one.
+
+    The next level has twice the resolution: pixel u here is 2 u + 0.5 there. Each new patch
+    starts on the plane of the nearest kept one within two grid steps.
+    """
+    h, w = shape
+    rows, columns = np.mgrid[0:h, 0:w] * float(stride_px)
+    u, v = (columns - 0.5) / 2.0, (rows - 0.5) / 2.0
+    distance, (iy, ix) = ndimage.distance_transform_edt(~keep, return_indices=True)
+    gy = np.clip(np.rint(v / map_.stride_px).astype(int), 0, keep.shape[0] - 1)
+    gx = np.clip(np.rint(u / map_.stride_px).astype(int), 0, keep.shape[1] - 1)
+    ny, nx = iy[gy, gx], ix[gy, gx]
+    near = distance[gy, gx] <= 2.0
+    slope = map_.slopes[ny, nx]
+    value = (
+        map_.inverse_depth[ny, nx]
+        + slope[..., 0] * (u - nx * map_.stride_px)
+        + slope[..., 1] * (v - ny * map_.stride_px)
+    )
+    return np.where(near, value, np.nan), slope / 2.0
+
+
+def masked(map_: DepthMap, keep: Bools) -> DepthMap:
+    """The same map with NaN where ``keep`` is false."""
+    return replace(
+        map_,
+        inverse_depth=np.where(keep, map_.inverse_depth, np.nan),
+        variance=np.where(keep, map_.variance, np.nan),
+        views=np.where(keep, map_.views, 0).astype(np.int8),
+    )

@@ -1,0 +1,279 @@
+"""From pictures of one capture to a cloud, in named steps with a cancel between.
+
+1. Coarse depth of each camera from its best pairs (:mod:`.stereo`), on quarter-size pictures.
+2. Patches over all near views on half-size pictures; gaps are grown into from their rims.
+3. Which cameras see each piece of surface best; only those measure it in full size.
+4. Patches on full-size pictures (:mod:`.depthmaps`).
+5. Fusion: agreement between cameras, mean along the normal (:mod:`.fusion`).
+6. Points that stand off their neighbours' surface go (:mod:`.neighbours`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from common.errors import CancelledError, InputError
+from common.progress import (
+    CancelToken,
+    NeverCancelled,
+    Progress,
+    ProgressCallback,
+    ignore_progress,
+)
+from evaluation.reconstruction.cloud import Cloud
+from evaluation.reconstruction.depthmaps import (
+    DepthMap,
+    Matching,
+    coarse_start,
+    first_slopes,
+    grown_start,
+    masked,
+    merged,
+    refined,
+    steady,
+    upsampled,
+)
+from evaluation.reconstruction.fusion import FusedPoints, best_references, fused
+from evaluation.reconstruction.neighbours import on_surface
+from evaluation.reconstruction.pairs import companions, partners, ray_angles_deg
+from evaluation.reconstruction.views import View
+from evaluation.reconstruction.volume import Volume, common_volume
+from geometry.arrays import Bools, Floats
+
+SHARES = {"coarse": 0.1, "half": 0.35, "full": 0.85, "fusion": 0.95, "surface": 1.0}
+"""How far the work has come at the end of each step, measured on seven cameras."""
+
+
+@dataclass(frozen=True)
+class ReconstructionOptions:
+    """How a reconstruction is made; the defaults suit faces.
+
+    ``references`` cameras measure each piece of surface; ``stride_px`` between the patches of
+    the full-size pictures; ``partners`` pairs a camera for coarse depth; ``companions`` views
+    beside the reference in a patch. ``stray_mm``: points farther off their neighbours go.
+    """
+
+    references: int = 3
+    partners: int = 2
+    companions: int = 4
+    stride_px: int = 2
+    growth: int = 3
+    stray_mm: float = 0.05
+    half: Matching = field(default_factory=lambda: Matching(half_width=4, steps=6))
+    full: Matching = field(default_factory=lambda: Matching(half_width=4, steps=5))
+    workers: int = 2
+
+
+@dataclass(frozen=True)
+class CameraShare:
+    """What one camera contributed: patches tried, measured, and points left after fusion."""
+
+    name: str
+    tried: int
+    measured: int
+    points: int
+
+
+@dataclass(frozen=True, eq=False)
+class Reconstruction:
+    """A cloud, the volume it was looked for in, and what each camera gave to it."""
+
+    cloud: Cloud
+    volume: Volume
+    cameras: tuple[CameraShare, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class _Network:
+    """All cameras at three sizes, and who works with whom."""
+
+    full: tuple[View, ...]
+    half: tuple[View, ...]
+    quarter: tuple[View, ...]
+    volume: Volume
+    partners: tuple[tuple[int, ...], ...]
+    companions: tuple[tuple[int, ...], ...]
+
+    def scale_px_mm(self, number: int, views: Sequence[View]) -> float:
+        """Focal length times the longest base to a companion: inverse depth to pixels."""
+        here = views[number].pose.position_rig_mm
+        bases = [
+            np.linalg.norm(views[k].pose.position_rig_mm - here) for k in self.companions[number]
+        ]
+        return float(views[number].matrix[0, 0] * max(bases))
+
+
+def reconstruct(
+    views: Sequence[View],
+    volume: Volume | None = None,
+    options: ReconstructionOptions = ReconstructionOptions(),
+    progress: ProgressCallback = ignore_progress,
+    cancel: CancelToken | None = None,
+) -> Reconstruction:
+    """The surface that the pictures show, in the rig frame.
+
+    ``volume`` where the subject is; without it the cameras' axes tell. Raises
+    :class:`InputError` where fewer than two cameras can work together, or nothing matches;
+    :class:`CancelledError` when told to stop.
+    """
+    report = _Reporter(progress, cancel or NeverCancelled())
+    network = _network(views, volume or common_volume(views), options)
+    halves = [_half_map(network, k, options, report) for k in range(len(views))]
+    best = best_references(halves, options.references)
+    fulls, tried = [], []
+    for k in range(len(views)):
+        report.step("full", k, len(views))
+        map_, count = _full_map(network, k, halves[k], best[k], options)
+        fulls.append(map_)
+        tried.append(count)
+    parts = []
+    for k in range(len(views)):
+        report.step("fusion", k, len(views))
+        parts.append(_inside(fused(fulls, k), network.volume))
+    report.step("surface", 0, 1)
+    return _result(network, fulls, parts, tried, options)
+
+
+class _Reporter:
+    """Tells how far the work is, and stops it when told to."""
+
+    def __init__(self, progress: ProgressCallback, cancel: CancelToken) -> None:
+        self._progress, self._cancel = progress, cancel
+        self._names = tuple(SHARES)
+
+    def step(self, name: str, number: int, count: int) -> None:
+        """Step ``name`` begins its part ``number`` of ``count``."""
+        if self._cancel.is_set():
+            raise CancelledError
+        index = self._names.index(name)
+        begin = SHARES[self._names[index - 1]] if index else 0.0
+        fraction = begin + (SHARES[name] - begin) * number / count
+        self._progress(Progress(name, fraction))
+
+
+def _network(views: Sequence[View], volume: Volume, options: ReconstructionOptions) -> _Network:
+    angles = ray_angles_deg(views, volume)
+    count = len(views)
+    pairs = tuple(partners(angles, k, options.partners) for k in range(count))
+    near = tuple(companions(angles, k, options.companions) for k in range(count))
+    if not any(pairs):
+        raise InputError(
+            "cameras-apart",
+            "no two cameras see the subject from directions less than 40 degrees apart",
+            "give more cameras, or cameras that stand nearer to one another",
+        )
+    half = tuple(v.reduced() for v in views)
+    return _Network(tuple(views), half, tuple(v.reduced() for v in half), volume, pairs, near)
+
+
+def _half_map(
+    network: _Network, k: int, options: ReconstructionOptions, report: _Reporter
+) -> DepthMap:
+    """The map of one camera on half-size pictures."""
+    count = len(network.full)
+    report.step("coarse", k, count)
+    view, others = network.half[k], [network.half[n] for n in network.companions[k]]
+    quarter = network.quarter[k]
+    coarse = coarse_start(
+        quarter, [network.quarter[n] for n in network.partners[k]], network.volume
+    )
+    smooth, slopes = first_slopes(coarse.astype(np.float64), 1.0)
+    start, slope = _doubled(smooth, slopes, view, options.half.stride_px)
+    if not others:
+        return refined_none(view, start.shape, options.half.stride_px)
+    scale = network.scale_px_mm(k, network.half)
+    report.step("half", k, count)
+    found = refined(view, others, start, slope, options.half.stride_px, options.half)
+    found = masked(found, steady(found, 2.0, scale))
+    for _ in range(2):
+        gaps, slope = grown_start(found, options.growth)
+        more = refined(view, others, gaps, slope, options.half.stride_px, options.half)
+        found = merged(found, more)
+        found = masked(found, steady(found, 2.0, scale))
+    return found
+
+
+def _doubled(value: Floats, slopes: Floats, view: View, stride_px: int) -> tuple[Floats, Floats]:
+    """Values and slopes of half-size pixels at the grid of the next size up."""
+    h, w = -(-view.grey.shape[0] // stride_px), -(-view.grey.shape[1] // stride_px)
+    rows, columns = np.mgrid[0:h, 0:w] * float(stride_px)
+    y = np.clip(np.rint((rows - 0.5) / 2.0), 0, value.shape[0] - 1).astype(np.int64)
+    x = np.clip(np.rint((columns - 0.5) / 2.0), 0, value.shape[1] - 1).astype(np.int64)
+    return value[y, x], slopes[y, x] / 2.0
+
+
+def refined_none(view: View, shape: tuple[int, ...], stride_px: int) -> DepthMap:
+    """The map of a camera that nobody can be matched with: nothing anywhere."""
+    nothing = np.full(shape, np.nan)
+    return DepthMap(
+        view,
+        stride_px,
+        nothing,
+        np.full((*shape, 2), np.nan),
+        nothing,
+        nothing.astype(np.float32),
+        np.zeros(shape, dtype=np.int8),
+    )
+
+
+def _full_map(
+    network: _Network, k: int, half: DepthMap, best: Bools, options: ReconstructionOptions
+) -> tuple[DepthMap, int]:
+    """The map of one camera on full-size pictures, and how many patches were tried."""
+    view, others = network.full[k], [network.full[n] for n in network.companions[k]]
+    stride = options.stride_px
+    shape = (-(-view.grey.shape[0] // stride), -(-view.grey.shape[1] // stride))
+    if not others or not best.any():
+        return refined_none(view, shape, stride), 0
+    start, slopes = upsampled(half, best, shape, stride)
+    found = refined(view, others, start, slopes, stride, options.full)
+    keep = steady(found, 2.0, network.scale_px_mm(k, network.full))
+    return masked(found, keep), int(np.isfinite(start).sum())
+
+
+def _inside(points: FusedPoints, volume: Volume) -> FusedPoints:
+    """Without what is outside the volume: the backdrop matches as well as skin does."""
+    offset = points.points_mm - volume.centre_rig_mm
+    return points.subset(np.linalg.norm(offset, axis=1) <= volume.radius_mm)
+
+
+def _result(
+    network: _Network,
+    maps: Sequence[DepthMap],
+    parts: Sequence[FusedPoints],
+    tried: Sequence[int],
+    options: ReconstructionOptions,
+) -> Reconstruction:
+    points = np.concatenate([p.points_mm for p in parts])
+    if len(points) == 0:
+        raise InputError(
+            "nothing-matched",
+            "no surface could be matched in these pictures",
+            "check that they are of one capture, sharp, not black, and of these cameras",
+        )
+    normals = np.concatenate([p.normals for p in parts])
+    sigma = np.concatenate([p.sigma_mm for p in parts])
+    owner = np.repeat(np.arange(len(parts)), [len(p.points_mm) for p in parts])
+    keep = on_surface(points, normals, sigma, options.stray_mm, options.workers)
+    colours = np.concatenate(
+        [
+            m.reference.colour[p.rows * m.stride_px, p.columns * m.stride_px]
+            for m, p in zip(maps, parts, strict=True)
+        ]
+    )
+    cloud = Cloud(
+        points[keep],
+        normals[keep],
+        colours[keep],
+        sigma[keep],
+        np.concatenate([p.views for p in parts])[keep].astype(np.uint8),
+    )
+    left = np.bincount(owner[keep], minlength=len(parts))
+    cameras = tuple(
+        CameraShare(v.name, tried[k], int(np.isfinite(maps[k].inverse_depth).sum()), int(left[k]))
+        for k, v in enumerate(network.full)
+    )
+    return Reconstruction(cloud, network.volume, cameras)

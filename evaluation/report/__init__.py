@@ -1,0 +1,1 @@
+"""Pages of reconstructions and comparisons: pictures from three sides, figures, tables."""

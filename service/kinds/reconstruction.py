@@ -1,0 +1,49 @@
+"""Reconstructions: the surface that the pictures of one capture show."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field
+
+from service.kinds.base import JobKind, Request, Result
+
+
+class ReconstructionRequest(Request):
+    """How to reconstruct. Everything may be left out."""
+
+    name: Annotated[str, Field(max_length=100, description="What to call it.")] = ""
+    frame: Annotated[
+        str | None,
+        Field(max_length=200, description="Which instant, where the pictures show several."),
+    ] = None
+    stride_px: Annotated[
+        int, Field(ge=1, le=16, description="Pixels between the points of a picture.")
+    ] = 2
+
+
+class CameraPart(Result):
+    """What one camera gave to a reconstruction."""
+
+    camera: str
+    tried: Annotated[int, Field(description="Patches tried.")]
+    measured: Annotated[int, Field(description="Patches that matched.")]
+    points: Annotated[int, Field(description="Points left when all cameras were heard.")]
+
+
+class ReconstructionResult(Result):
+    """What was found, in short; ``cloud.ply`` holds the points."""
+
+    frame: str
+    points: int
+    sigma_median_mm: float
+    views_median: int
+    centre_rig_mm: list[float]
+    radius_mm: float
+    cameras: list[CameraPart]
+    without_pictures: Annotated[
+        list[str], Field(description="Cameras of the rig that have no picture of this instant.")
+    ]
+
+
+RECONSTRUCTION = JobKind("reconstruction", ReconstructionRequest, ReconstructionResult)

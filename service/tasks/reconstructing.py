@@ -1,0 +1,122 @@
+"""Reconstructions: pictures of one instant and the cameras that took them, in; a cloud, out."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from calibration.detection.images import read_colour
+from calibration.exports import rig_cameras
+from calibration.files import read_calibration
+from common.errors import InputError
+from common.progress import Progress
+from evaluation.extras import require_numba
+from evaluation.reconstruction.cloudfile import write_cloud
+from evaluation.reconstruction.reconstructing import (
+    Reconstruction,
+    ReconstructionOptions,
+    reconstruct,
+)
+from evaluation.reconstruction.views import View, view_of
+from evaluation.report.pages import reconstruction_page
+from geometry.camera import RigCamera
+from rig.design.designfile import read_design
+from service.jobs.engine import Running, Task
+from service.kinds.reconstruction import CameraPart, ReconstructionRequest, ReconstructionResult
+from service.pictures.listing import Picture
+from service.tasks.seeing import taken_pictures
+
+READING = 0.1
+"""Share of the progress that goes to reading the pictures."""
+
+
+def reconstruction(
+    task: Task[ReconstructionRequest, ReconstructionResult], running: Running
+) -> ReconstructionResult:
+    """Write ``cloud.ply`` and ``report.html``.
+
+    The cameras come from the input ``calibration``, or ``design`` where they are as designed.
+    """
+    require_numba()
+    cameras = _cameras(task.inputs)
+    with tempfile.TemporaryDirectory(prefix="pictures-", dir=task.folder.parent) as temporary:
+        frame, chosen = _one_frame(taken_pictures(task, Path(temporary)), task.request.frame)
+        views = _views(cameras, chosen, running)
+    options = ReconstructionOptions(
+        stride_px=task.request.stride_px, workers=max(task.run.workers, 1)
+    )
+
+    def within(inner: Progress, /) -> None:
+        share = READING + (0.98 - READING) * inner.fraction
+        running.report(Progress(f"matching, {inner.stage}", share))
+
+    done = reconstruct(views, options=options, progress=within, cancel=running.cancel)
+    missing = sorted({c.name for c in cameras} - {v.name for v in views})
+    write_cloud(task.folder / "cloud.ply", done.cloud)
+    title = task.request.name or f"Reconstruction of {frame}"
+    notes = [f"No picture of {', '.join(missing)}."] if missing else []
+    page = reconstruction_page(done, title, notes)
+    (task.folder / "report.html").write_text(page, encoding="utf-8")
+    running.report(Progress("done", 1.0))
+    return _result(done, frame, missing)
+
+
+def _cameras(inputs: Mapping[str, Path]) -> tuple[RigCamera, ...]:
+    if "calibration" in inputs:
+        like = read_design(inputs["design"]).cameras if "design" in inputs else ()
+        return rig_cameras(read_calibration(inputs["calibration"]).calibration.cameras, like)
+    return read_design(inputs["design"]).cameras
+
+
+def _one_frame(pictures: Sequence[Picture], wanted: str | None) -> tuple[str, dict[str, Picture]]:
+    """The pictures of one instant by camera. Raises :class:`InputError` where it is not clear."""
+    frames = sorted({p.frame for p in pictures})
+    if wanted is None and len(frames) > 1:
+        raise InputError(
+            "frames",
+            f"the pictures show {len(frames)} instants ({frames[0]} to {frames[-1]})",
+            "name one with --frame, or one capture of the session with --capture",
+        )
+    frame = frames[0] if wanted is None else wanted
+    if frame not in frames:
+        raise InputError(
+            "frame", f"no picture is of the instant {frame!r}", f"give one of {', '.join(frames)}"
+        )
+    return frame, {p.camera: p for p in pictures if p.frame == frame}
+
+
+def _views(
+    cameras: Sequence[RigCamera], pictures: Mapping[str, Picture], running: Running
+) -> list[View]:
+    known = [camera for camera in cameras if camera.name in pictures]
+    if len(known) < 2:
+        raise InputError(
+            "cameras-few",
+            f"{len(known)} of the {len(cameras)} cameras of this rig have a picture here "
+            f"(pictures are of {', '.join(sorted(pictures)) or 'none'})",
+            "name the folders of pictures as the cameras are named",
+        )
+    views = []
+    for number, camera in enumerate(known):
+        running.report(Progress("reading the pictures", READING * number / len(known)))
+        views.append(view_of(read_colour(pictures[camera.name].path), camera))
+    return views
+
+
+def _result(done: Reconstruction, frame: str, missing: list[str]) -> ReconstructionResult:
+    return ReconstructionResult(
+        frame=frame,
+        points=len(done.cloud),
+        sigma_median_mm=float(np.median(done.cloud.sigma_mm)),
+        views_median=int(np.median(done.cloud.views)),
+        centre_rig_mm=[float(v) for v in done.volume.centre_rig_mm],
+        radius_mm=done.volume.radius_mm,
+        cameras=[
+            CameraPart(camera=c.name, tried=c.tried, measured=c.measured, points=c.points)
+            for c in done.cameras
+        ],
+        without_pictures=missing,
+    )

@@ -1,0 +1,102 @@
+"""The geometry that matching stands on, against the collinearity equations themselves."""
+
+from __future__ import annotations
+
+import matching_scenes as scenes
+import numpy as np
+import pytest
+
+from common.errors import InputError
+from evaluation.reconstruction.depthmaps import DepthMap, relations
+from evaluation.reconstruction.fusion import measured_points
+from evaluation.reconstruction.neighbours import on_surface
+from evaluation.reconstruction.pairs import companions, partners, ray_angles_deg
+from evaluation.reconstruction.views import View
+from evaluation.reconstruction.volume import Volume, common_volume
+
+
+def projected(view: View, points: np.ndarray) -> np.ndarray:
+    local = (points - view.pose.position_rig_mm) @ view.pose.rotation_rig_to_camera.T
+    return (local / local[:, 2:]) @ view.matrix.T
+
+
+def test_a_pixel_at_an_inverse_depth_is_seen_where_its_point_is() -> None:
+    views = scenes.plane_views()
+    matrices, shifts = relations(views[0], views[1:])
+    rng = np.random.default_rng(3)
+    pixel = np.column_stack([rng.uniform(0, 200, (50, 2)), np.ones(50)])
+    rho = rng.uniform(1 / 500, 1 / 300, 50)
+    rays = pixel @ np.linalg.inv(views[0].matrix).T / rho[:, None]
+    points = rays @ views[0].pose.rotation_rig_to_camera + views[0].pose.position_rig_mm
+    for view, matrix, shift in zip(views[1:], matrices, shifts, strict=True):
+        seen = pixel @ matrix.T + rho[:, None] * shift
+        # Rounding of numbers of a few hundred.
+        assert seen / seen[:, 2:] == pytest.approx(projected(view, points), abs=1e-9)
+
+
+def test_a_reduced_view_shows_points_where_its_pixels_are() -> None:
+    view = scenes.plane_views()[0]
+    small = view.reduced()
+    points = np.random.default_rng(0).uniform(-20, 20, (20, 3))
+    full, half = projected(view, points)[:, :2], projected(small, points)[:, :2]
+    assert half == pytest.approx((full - 0.5) / 2.0, abs=1e-9)
+    assert small.grey[3, 5] == pytest.approx(view.grey[6:8, 10:12].mean(), abs=1e-6)
+
+
+def test_the_volume_is_where_the_axes_meet() -> None:
+    volume = common_volume(scenes.plane_views())
+    assert volume.centre_rig_mm == pytest.approx(np.zeros(3), abs=1e-9)
+    # Half of the wider side, 240 px, at about 417 mm and 900 px.
+    assert volume.radius_mm == pytest.approx(417 * 120 / 900, rel=0.02)
+
+
+def test_parallel_cameras_have_no_common_volume() -> None:
+    views = [scenes.plane_view(f"c{k}", scenes.looking_at_origin((0, -400, 0))) for k in range(2)]
+    with pytest.raises(InputError, match="in parallel"):
+        common_volume(views)
+
+
+def test_partners_stand_at_the_angle_that_matches_best() -> None:
+    angles = np.abs(np.subtract.outer([0.0, 6.0, 13.0, 30.0, 70.0], [0.0, 6.0, 13.0, 30.0, 70.0]))
+    assert partners(angles, 0, 2) == (2, 3)
+    assert companions(angles, 0, 4) == (1, 2, 3)
+    assert partners(angles, 4, 2) == (3,)
+
+
+def test_rays_to_the_middle_make_the_angles() -> None:
+    views = scenes.plane_views()
+    angle = ray_angles_deg(views, Volume(np.zeros(3), 50.0))[0, 1]
+    a, b = (v.pose.position_rig_mm for v in views[:2])
+    assert np.cos(np.radians(angle)) == pytest.approx(a @ b / np.linalg.norm(a) / np.linalg.norm(b))
+
+
+def exact_map(view: View, stride: int = 3) -> DepthMap:
+    rho = scenes.true_inverse_depth(view)
+    dy, dx = np.gradient(rho)
+    grid = (slice(None, None, stride), slice(None, None, stride))
+    slopes = np.stack([dx, dy], axis=-1)[grid]
+    shape = rho[grid].shape
+    return DepthMap(
+        view, stride, rho[grid], slopes, np.full(shape, 1e-12), np.ones(shape, np.float32),
+        np.full(shape, 2, np.int8),
+    )  # fmt: skip
+
+
+def test_points_of_an_exact_map_lie_on_the_plane_and_face_the_camera() -> None:
+    view = scenes.plane_views()[2]
+    points = measured_points(exact_map(view))
+    normal = scenes.TILTED / np.linalg.norm(scenes.TILTED)
+    assert np.abs(points.points_mm @ normal).max() < 1e-9
+    # A plane's inverse depth is linear in the picture, so differences are exact too.
+    assert points.normals == pytest.approx(np.broadcast_to(normal, points.normals.shape), abs=1e-9)
+
+
+def test_stray_points_and_rims_go_and_the_surface_stays() -> None:
+    rng = np.random.default_rng(2)
+    flat = np.column_stack([rng.uniform(0, 30, (4000, 2)), rng.normal(0, 0.01, 4000)])
+    stray = np.column_stack([rng.uniform(0, 30, (60, 2)), rng.uniform(0.3, 2.0, 60)])
+    points = np.vstack([flat, stray])
+    normals = np.broadcast_to([0.0, 0.0, 1.0], points.shape)
+    keep = on_surface(points, normals, np.full(len(points), 0.01), 0.05)
+    assert keep[:4000].mean() > 0.999
+    assert not keep[4000:].any()
