@@ -192,6 +192,7 @@ def test_the_guide_lists_no_error_that_cannot_come() -> None:
     stored = (*JOB_KINDS, *STATION_KINDS, targetsets.KIND, picturesets.KIND)
     of_job_kinds = {f"not-found/{kind}" for kind in stored}
     of_rigs = codes_in_the_code("rig") | codes_in_the_code("calibration")
+    of_rigs |= codes_in_the_code("common")
     assert listed - codes_in_the_code() - of_rigs - framework - of_job_kinds == set()
 
 
