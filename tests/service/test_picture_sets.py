@@ -66,11 +66,9 @@ def test_an_archive_may_have_a_folder_around_all(tmp_path: Path) -> None:
     (tmp_path / "p.zip").write_bytes(
         packed("all/cam01/1.png", "all/cam02/1.png", "all/notes.txt", "__MACOSX/cam01/1.png")
     )
-    assert archive_facts(tmp_path / "p.zip") == {
-        "cameras": {"cam01": 1, "cam02": 1},
-        "frames": 1,
-        "bytes": 2 * len(PIXEL),
-    }
+    facts = archive_facts(tmp_path / "p.zip")
+    assert facts.cameras == {"cam01": 1, "cam02": 1}
+    assert (facts.frames, facts.bytes) == (1, 2 * len(PIXEL))
     (tmp_path / "out").mkdir()
     unpack(tmp_path / "p.zip", tmp_path / "out")
     assert [p.path.read_bytes() for p in pictures_in_folder(tmp_path / "out")] == [PIXEL, PIXEL]
@@ -84,6 +82,7 @@ def test_an_archive_may_have_a_folder_around_all(tmp_path: Path) -> None:
         (packed("readme.txt"), "input/pictures-none"),
         (packed("a/1.png", "b/a/1.png"), "input/pictures-twice"),
         (packed("a/\x1b[31m.png"), "input/pictures-archive"),
+        (packed("cam01\n/1.png"), "input/pictures-archive"),
         (packed("../1.png"), "input/pictures-none"),
         (packed("a/1.png")[:-30], "input/pictures-archive"),
         (
@@ -92,7 +91,7 @@ def test_an_archive_may_have_a_folder_around_all(tmp_path: Path) -> None:
         ),
     ],
     # An archive carries the time it was made: as part of a test's name it differs by worker.
-    ids=["no-zip", "loose", "text", "twice", "name", "outside", "cut", "bomb"],
+    ids=["no-zip", "loose", "text", "twice", "name", "newline", "outside", "cut", "bomb"],
 )
 def test_archives_that_are_refused(
     client: TestClient, service: Service, content: bytes, code: str
@@ -114,7 +113,7 @@ def broken(path: Path, method: int) -> None:
 @pytest.mark.parametrize("method", [zipfile.ZIP_DEFLATED, zipfile.ZIP_LZMA, zipfile.ZIP_BZIP2])
 def test_a_picture_that_cannot_be_unpacked_is_one_line(tmp_path: Path, method: int) -> None:
     broken(tmp_path / "p.zip", method)
-    assert archive_facts(tmp_path / "p.zip")["frames"] == 1
+    assert archive_facts(tmp_path / "p.zip").frames == 1
     with pytest.raises(InputError, match=r"p\.zip is no sound ZIP archive"):
         unpack(tmp_path / "p.zip", tmp_path)
 
