@@ -44,7 +44,7 @@ def demo(task: Task[DemoRequest, DesignResult], running: Running) -> DesignResul
     """Design the example face rig for the bundled head; both are put beside the design."""
     running.report(Progress("making the head", 0.0))
     scan = task.folder.with_name("head.ply")
-    _write_scan(synthetic_head(), scan)
+    write_scan(synthetic_head(), scan)
     rig = example_text("face")
     spec = parse_rig(rig, "face.toml")
     result = _designed(scan, spec, task.folder, scan.name, task.run.workers, running)
@@ -96,7 +96,7 @@ def _designed(
     return _result(made, layout, prepared, spec.name)
 
 
-def _write_scan(scan: Scan, path: Path) -> None:
+def write_scan(scan: Scan, path: Path) -> None:
     """A scan as a mesh file, millimetres in the rig frame."""
     trimesh.Trimesh(
         scan.vertices_mm, scan.faces, vertex_normals=scan.normals, process=False

@@ -29,11 +29,11 @@ from geometry.frames import Pose
 from geometry.head import synthetic_head
 from rig.design.designfile import placed_camera
 from rig.specification.examples import example_text
-from service import work
 from service.api.app import create_app
 from service.api.context import Service
 from service.kinds.queued import QUEUED
 from service.settings import read_settings
+from service.tasks.designing import write_scan
 
 JSON = dict[str, Any]
 SLOT = 'kind = "t-slot"\n'
@@ -221,7 +221,7 @@ def test_mounts_that_cannot_be_over_http(
     tmp_path: Path, client: TestClient, service: Service
 ) -> None:
     head = tmp_path / "head.ply"
-    work.write_scan(synthetic_head(), head)
+    write_scan(synthetic_head(), head)
     scan = client.post("/v1/scans?filename=head.ply", content=head.read_bytes())
     assert scan.status_code == 201, scan.text
     asked = {"scan_id": scan.json()["id"], "rig": small_rig()}

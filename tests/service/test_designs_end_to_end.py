@@ -30,11 +30,11 @@ from starlette.testclient import TestClient
 from common.files.ownership import files_of
 from geometry.head import synthetic_head
 from rig.report.designfolder import FILE_NAMES
-from service import work
 from service.api.app import create_app
 from service.api.context import Service
 from service.kinds.queued import QUEUED
 from service.settings import read_settings
+from service.tasks.designing import write_scan
 
 JSON = dict[str, Any]
 TERMINAL = {"completed", "failed", "cancelled", "interrupted"}
@@ -43,7 +43,7 @@ TERMINAL = {"completed", "failed", "cancelled", "interrupted"}
 @pytest.fixture(scope="module")
 def head(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("head") / "head.ply"
-    work.write_scan(synthetic_head(), path)
+    write_scan(synthetic_head(), path)
     return path
 
 

@@ -18,11 +18,11 @@ from starlette.testclient import TestClient
 from geometry.head import synthetic_head
 from rig.build.mounts.planfile import plan_from_mapping, read_plan
 from rig.design.designfile import design_from_mapping
-from service import work
 from service.api.app import create_app
 from service.api.context import Service
 from service.kinds.queued import QUEUED
 from service.settings import read_settings
+from service.tasks.designing import write_scan
 
 JSON = dict[str, Any]
 BEYOND_DEG = 3.0
@@ -53,7 +53,7 @@ def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
 @pytest.fixture(scope="module")
 def head(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("head") / "head.ply"
-    work.write_scan(synthetic_head(), path)
+    write_scan(synthetic_head(), path)
     return path
 
 
