@@ -18,7 +18,7 @@ from pydantic import ValidationError
 
 from common.errors import InputError, InternalError, RigwrightError
 from service.cli.progress import show_progress
-from service.jobs.engine import Task
+from service.jobs.engine import Engine, Task
 from service.jobs.process import ProcessEngine
 from service.kinds.base import JobKind, RequestT, ResultT, RunContext
 from service.logs import log
@@ -68,17 +68,18 @@ def run_task(
     inputs: Mapping[str, Path],
     folder: Path,
     run: RunContext | None = None,
+    engine: Engine | None = None,
 ) -> ResultT:
     """Do one piece of work in a process of its own, with progress on standard error.
 
     ``folder`` exists and is empty; what the work writes is left in it. The first Ctrl-C (or
-    TERM) cancels.
+    TERM) cancels. ``engine``: who runs it, a process of this program without one.
     """
     require_files(inputs.values())
     whole = {role: path.resolve() for role, path in inputs.items()}
     task = Task(kind, request, folder.resolve(), whole, run or RunContext())
     with cancel_on_signal() as cancel, show_progress() as report:
-        return ProcessEngine().run(task, report, cancel)
+        return (engine or ProcessEngine()).run(task, report, cancel)
 
 
 def processes(asked: int | None) -> int:

@@ -21,6 +21,7 @@ PAGES = sorted(
         "benchmarks",
     )
     for path in (ROOT / place).glob("*.md" if place == "." else "**/*.md")
+    if "node_modules" not in path.parts
 )
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 CODE = re.compile(r"^```.*?^```|`[^`\n]*`", re.DOTALL | re.MULTILINE)

@@ -14,12 +14,14 @@ from pathlib import Path
 import httpx2
 import pytest
 import typer
+from counting_job import COUNT, CountRequest
 from service_helpers import HERE, RIGWRIGHT, files_under, rigwright, wait_for
 
 from common.errors import CancelledError, ConflictError, InputError
 from common.files.folders import new_folder
 from common.files.ownership import files_of
 from service.cli.running import one_line_errors, run_task
+from service.jobs.process import ProcessEngine
 
 
 def cpu_s(*command: str) -> float:
@@ -170,7 +172,9 @@ def test_errors_of_all_kinds_become_exit_codes(capsys: pytest.CaptureFixture[str
 def test_progress_is_plain_lines_without_a_terminal(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert run_task("counting_job:count", {"to": 3}, {}, tmp_path)["counted"] == 3
+    engine = ProcessEngine(program="counting_job")
+    done = run_task(COUNT, CountRequest(to=3), {}, tmp_path, engine=engine)
+    assert done.counted == 3
     lines = capsys.readouterr().err.splitlines()
     assert lines[0] == "  0 % counting: start 1, iteration 0, cost -, violation -"
     assert len(lines) == 3
@@ -181,11 +185,14 @@ COUNTING = (
     f"import sys; sys.path.insert(0, {str(HERE)!r})\n"
     "from pathlib import Path\n"
     "from common.files.folders import new_folder\n"
+    "from counting_job import COUNT, CountRequest\n"
     "from service.cli.running import one_line_errors, run_task\n"
+    "from service.jobs.process import ProcessEngine\n"
     "import typer\n"
     "def main(out: Path) -> None:\n"
     "    with one_line_errors(), new_folder(out, force=False) as folder:\n"
-    "        run_task('counting_job:count', {'to': 3000, 'mark': out.name}, {}, folder)\n"
+    "        engine = ProcessEngine(program='counting_job')\n"
+    "        run_task(COUNT, CountRequest(to=3000), {}, folder, engine=engine)\n"
     "typer.run(main)\n"
 )
 
