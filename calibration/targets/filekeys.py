@@ -4,13 +4,19 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 
 from common.files.strict import StrictModel
 
-Triple = tuple[float, float, float]
+
+def _tuple(value: object) -> object:
+    """A list as a tuple: a body over HTTP is parsed before it is checked, and JSON has lists."""
+    return tuple(value) if isinstance(value, list) else value
+
+
+Triple = Annotated[tuple[float, float, float], BeforeValidator(_tuple)]
 Sigma = Annotated[float, Field(ge=0.0, allow_inf_nan=True)]
-Sigmas = tuple[Sigma, Sigma, Sigma]
+Sigmas = Annotated[tuple[Sigma, Sigma, Sigma], BeforeValidator(_tuple)]
 
 
 class RulerModel(StrictModel):

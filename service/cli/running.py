@@ -37,8 +37,9 @@ def one_line_errors() -> Iterator[None]:
         # What an option's own limits let through, the request's do not.
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"])
-        message = first["msg"].removeprefix("Value error, ")
-        refused = InputError("request-invalid", f"{where}: {message}", "see --help")
+        message = first["msg"].removeprefix("Value error, ").replace("Input should", "it should")
+        problem = f"{where}: {message}" if where else message
+        refused = InputError("request-invalid", problem, "see --help")
         sys.stderr.write(f"rigwright: {refused}\n")
         raise typer.Exit(exit_code_of(refused)) from None
     except RigwrightError as error:

@@ -363,7 +363,9 @@ def test_references_that_are_none(folder: Path) -> None:
     assert "check-1.json is not JSON" in line(*reference, "--history", "checks")
     accept = (*reference, *targets, "--limit")
     assert "permits no error" in line(*accept, 0, 0, 1, command="accept")
-    assert "must be positive" in line(*accept, 9, 9, 9, "--volume", 0, 1, 1, command="accept")
+    assert "width_mm: it should be greater than 0" in line(
+        *accept, 9, 9, 9, "--volume", 0, 1, 1, command="accept"
+    )
 
 
 @slow
@@ -374,7 +376,7 @@ def test_requests_that_contradict_themselves(folder: Path) -> None:
         )
 
     assert "give the design" in line("pictures", "--poses-known-to", 1, 1)
-    assert "held and free" in line("pictures", "--hold", "f", "--free", "f")
+    assert "f is among hold and among free" in line("pictures", "--hold", "f", "--free", "f")
     assert "is no session" in line("pictures", "--capture", "one")
     assert "there is no file pictrues" in line("pictrues")
     Session.create(folder / "empty", SessionPlan("studio", "0" * 64)).close()

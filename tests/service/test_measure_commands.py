@@ -139,8 +139,9 @@ def test_checks_are_green_then_red_and_collected(work: Path) -> None:
         ("camera-moved", ["cam03"])
     ]
     effect = red["result"]["findings"][0]["effect_mm"]
-    # Cameras at 0.9 m: 0.5 mm aside shift points at the subject by about as much.
-    assert effect == pytest.approx(KNOCK_MM, rel=0.5)
+    # The worst place of the face counts: seen by two cameras only, 233 mm apart at 900 mm, it moves
+    # along its depth by 0.5 mm x 900 / 233; a place that all see moves by less than the knock.
+    assert KNOCK_MM < effect < KNOCK_MM * 900.0 / 233.0
     assert len(list((work / "history").glob("check-*.json"))) == 2
     assert "over 2 checks" in (work / "history" / "history.html").read_text()
     said = rigwright("check", "wednesday", "--reference", "calibration/calibration.json",

@@ -46,8 +46,8 @@ def test_the_stated_variance_is_that_of_the_scatter() -> None:
     # Against the same pictures without noise: what interpolation adds is the same in both.
     z = ((found.inverse_depth - clean.inverse_depth) / np.sqrt(found.variance))[inside]
     spread = 1.4826 * np.median(np.abs(z))
-    # 1,500 patches that overlap: the spread itself is known to about 4 %. Interpolated noise is
-    # smoother than the residuals assume, which costs up to a fifth.
+    # 1,500 patches that overlap: the spread itself is known to about 4 %. The gradient is taken
+    # from noisy pixels too, which is not in the covariance: a tenth at this noise.
     assert 0.75 < spread < 1.25
 
 
