@@ -85,7 +85,7 @@ def test_places_that_cannot_be_written(
     (tmp_path / "file").write_text("x")
     with pytest.raises(ConflictError, match="is not a folder"):
         check_design_folder(tmp_path / "file")
-    with pytest.raises(InputError, match="cannot write to"):
+    with pytest.raises(InputError, match="cannot write into"):
         write_design_folder(
             tmp_path / "file" / "out", design, layout, prepared, example_rig("face")
         )

@@ -37,7 +37,7 @@ def test_no_noise_makes_a_pulse_or_stops_the_box(noisy_box: FirmwareSim, noise: 
     noisy_box.hush()
     assert "st=IDLE" in noisy_box.ask("STAT?")
     assert not noisy_box.edges()
-    assert noisy_box.ask("BOOT?") == "OK n=1 cause=POWER"
+    assert noisy_box.ask("BOOT?").startswith("OK n=1 cause=POWER id=")
 
 
 def test_a_sound_line_gets_one_reply_whatever_was_before(box: FirmwareSim) -> None:
@@ -68,15 +68,17 @@ def test_lines_end_to_end_are_all_answered(box: FirmwareSim) -> None:
 
 
 def test_what_is_lost_in_a_flood_is_never_half_believed(box: FirmwareSim) -> None:
-    # Requests at the line's full rate, replies six times as long: most must be lost. Each one
-    # that is answered was answered whole, and nothing else was understood.
+    # Requests at the line's full rate, replies eight times as long: most must be lost. Each one
+    # that is answered was answered whole, and nothing else was understood. In the time of 2000
+    # requests of 15 bytes the line carries 250 replies of 120; a quarter of them is asked for,
+    # as what was cut off gets replies too.
     requests = 2000
     box.send(b"".join(sealed(f"{n} CAP?").encode() + b"\n" for n in range(requests)))
     box.run(3000.0)
     heads = [line.split(" ")[0] for line in box.lines(1.0)]
     numbers = [int(head) for head in heads if head.isdigit()]
     assert numbers == sorted(set(numbers)), "each once, in order"
-    assert len(numbers) > 100
+    assert len(numbers) > 60
     assert set(heads) - {str(n) for n in numbers} <= {"?", "!"}
     assert "?" in heads, "nothing was lost: this test tests nothing"
     box.hush()

@@ -211,14 +211,15 @@ def test_files_that_tethering_software_fetches(tmp_path: Path) -> None:
         (root / name).mkdir(parents=True)
     path = tmp_path / "station.toml"
     path.write_text(FOLDER_STATION.format(root=root))
-    picture = Image.effect_noise((64, 48), 80.0)
     with open_station(read_station(path), locks=tmp_path / "locks") as rig:
         assert rig.box is not None
         wanted = ["left", "right"]
 
         def fetch(report: object) -> None:  # noqa: ARG001
             for name in wanted:
-                picture.save(root / name / f"{name}-{len(wanted)}.jpg")
+                # No two exposures are alike: the same bytes again would be the same picture.
+                picture = Image.effect_noise((64, 48), 80.0)
+                picture.save(root / name / f"{name}-{3 - len(wanted)}.jpg")
 
         rig.box.subscribe(fetch)
         with rig.new_session(tmp_path / "session") as session:
