@@ -3,6 +3,9 @@
 Camera to world, metres, camera axes x right, y up, looking along -z; world Z up, which is the
 rig's own. The corner of the image is (0, 0): nerfstudio shoots its rays through pixel centres
 at 0.5. Each frame carries its own intrinsics.
+
+Which images train and which evaluate is said in the file: left to itself, nerfstudio keeps a tenth
+for evaluation, rounded down, which is none of a face rig's seven.
 """
 
 from __future__ import annotations
@@ -41,12 +44,29 @@ def _frame(rig_camera: RigCamera, options: ExportOptions) -> dict[str, object]:
     }
 
 
+EVALUATED_SHARE = 0.1
+"""Share of the images that are kept from training, as in nerfstudio, but at least one."""
+
+FEWEST_TRAINED = 2
+
+
+def _split(paths: list[object]) -> dict[str, list[object]]:
+    """File names by what they are for; nothing where too few would be left to train on."""
+    count = max(1, int(EVALUATED_SHARE * len(paths)))
+    if len(paths) - count < FEWEST_TRAINED:
+        return {}
+    # Spread over the rig: of one the middle camera, whose view its neighbours know best.
+    kept = {int((k + 0.5) * len(paths) / count) for k in range(count)}
+    held = [path for k, path in enumerate(paths) if k in kept]
+    trained = [path for k, path in enumerate(paths) if k not in kept]
+    return {"train_filenames": trained, "val_filenames": held, "test_filenames": held}
+
+
 def write(cameras: Cameras, options: ExportOptions) -> Files:
     """``transforms.json``."""
-    document = {
-        "camera_model": "OPENCV",
-        "frames": [_frame(camera, options) for camera in cameras],
-    }
+    frames = [_frame(camera, options) for camera in cameras]
+    split = _split([frame["file_path"] for frame in frames])
+    document = {"camera_model": "OPENCV", **split, "frames": frames}
     return {"transforms.json": (json.dumps(document, indent=1) + "\n").encode()}
 
 

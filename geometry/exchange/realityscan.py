@@ -33,29 +33,30 @@ _TEMPLATE = """\
 # "Coeficients" is how the program itself spells it; spelt right, it is ignored.
 
 
-def _distortion(camera: Camera) -> tuple[str, str]:
-    """RealityScan's smallest model that holds the distortion, and its six terms."""
+MODEL = "brown3t2"
+"""Said of every camera, with terms of 0 where there is no distortion: AliceVision's importer of
+these files takes no other model (its ``importXMP``), RealityScan takes it as well as any."""
+
+
+def _terms(camera: Camera) -> str:
+    """The six distortion terms."""
     k1, k2, p1, p2, k3 = camera.distortion
-    terms = " ".join(map(number, (k1, k2, k3, 0.0, p2, p1)))
-    if not camera.distortion.any():
-        return "perspective", terms
-    return ("brown3t2" if p1 or p2 else "brown3"), terms
+    return " ".join(map(number, (k1, k2, k3, 0.0, p2, p1)))
 
 
 def _xmp(rig_camera: RigCamera, options: ExportOptions) -> bytes:
     camera, pose = rig_camera.camera, rig_camera.pose
     longer = max(camera.image_size_px)
     u, v = principal_offset_px(camera) / longer
-    model, terms = _distortion(camera)
     text = _TEMPLATE.format(
         prior=options.pose_prior,
-        model=model,
+        model=MODEL,
         focal=number(camera.focal_length_px * FULL_FRAME_WIDTH_MM / longer),
         u=number(u),
         v=number(v),
         rotation=numbers(pose.rotation_rig_to_camera),
         position=numbers(pose.position_rig_mm * METRES_PER_MM),
-        terms=terms,
+        terms=_terms(camera),
     )
     return text.encode()
 

@@ -64,6 +64,49 @@ def settings_in(lines: list[str]) -> dict[str, float]:
     return {row[1]: float(row[2]) for row in rows if row}
 
 
+CHAIN_ROW = re.compile(r"^#(\d+)" + 6 * r" (-?\d+\.\d+)" + r" (.+)$")
+MOTION = re.compile(r"^(slide|turn) (\S+|\(.*\)) by (.+?)(?: x (-?\d+\.\d+))?$")
+
+
+def chain_pose(lines: list[str], values: dict[str, float]) -> tuple[np.ndarray, np.ndarray]:
+    """Optical centre from the datum (3,) and rotation_rig_to_camera (3, 3), from a sheet alone.
+
+    Goes along the rows of the chain as their heading says, with the settings of the same sheet.
+    """
+    at = np.eye(4)
+    rows = {int(m[1]): m for m in map(CHAIN_ROW.match, lines) if m}
+    for number in range(1, len(rows) + 1):
+        row = rows[number]
+        x, y, z, first, second, third = (float(row[k]) for k in range(2, 8))
+        step = np.eye(4)
+        step[:3, 3] = x, y, z
+        step[:3, :3] = about("z", first) @ about("x", second) @ about("y", third)
+        at = at @ step
+        motion = MOTION.match(row[8])
+        if motion is None:
+            continue
+        value = values[motion[3]] * float(motion[4] or 1.0)
+        sign, axis = (-1.0 if motion[2][0] == "-" else 1.0), motion[2][-1]
+        moved = np.eye(4)
+        if motion[1] == "slide":
+            moved[:3, 3] = sign * value * np.eye(3)["xyz".index(axis)]
+        else:
+            moved[:3, :3] = about(axis, sign * value)
+        at = at @ moved
+    return at[:3, 3], at[:3, :3].T
+
+
+def about(axis: str, angle_deg: float) -> np.ndarray:
+    """Right-handed rotation about a coordinate axis, written down."""
+    c, s = np.cos(np.radians(angle_deg)), np.sin(np.radians(angle_deg))
+    k = "xyz".index(axis)
+    i, j = (k + 1) % 3, (k + 2) % 3
+    matrix = np.eye(3)
+    matrix[i, i] = matrix[j, j] = c
+    matrix[i, j], matrix[j, i] = -s, s
+    return matrix
+
+
 def pdf_lines(pdf: bytes) -> list[list[str]]:
     """Lines of text per page."""
     document = pypdfium2.PdfDocument(pdf)

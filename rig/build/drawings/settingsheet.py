@@ -8,6 +8,7 @@ import numpy as np
 
 from geometry.arrays import Floats
 from rig.build.drawings.annotate import Labels
+from rig.build.drawings.chainrows import CHAIN_COLUMNS, CHAIN_WORDS, chain_rows
 from rig.build.drawings.figures import POSE_COLUMNS, fixed, mm, pose_figures, setting_text
 from rig.build.drawings.frame import A4_MM, BLOCK_MM, MARGIN_MM, Content, fitted, framed
 from rig.build.drawings.items import Item, Line, Sheet, Text
@@ -22,7 +23,7 @@ SETTING_COLUMNS = ("Setting", "Set to", "Unit", "Step", "May be off by", "Measur
 TAPE_COLUMNS = ("Tape from", "to", "mm")
 LEFT_MM = MARGIN_MM + 8.0
 WIDE_MM = A4_MM[0] - 2.0 * LEFT_MM
-PICTURE_MM = (WIDE_MM / 2.0 - 4.0, 78.0)
+PICTURE_MM = (WIDE_MM / 2.0 - 4.0, 58.0)
 
 
 def setting_sheets(plan: MountPlan) -> tuple[Sheet, ...]:
@@ -70,6 +71,11 @@ def _tables(plan: MountPlan, mount: CameraMount) -> list[Table]:
         Table("Set", SETTING_COLUMNS, settings),
         Table("Check with a tape measure", TAPE_COLUMNS, tapes),
         Table("What results: optical centre from the datum", POSE_COLUMNS, (pose,)),
+        Table(
+            f"From the datum to the optical centre. {CHAIN_WORDS}",
+            CHAIN_COLUMNS,
+            chain_rows(mount, plan.datum_rig_mm),
+        ),
     ]
 
 

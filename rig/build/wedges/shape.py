@@ -31,6 +31,12 @@ STEEPEST_DEG = 58.0
 
 LEAST_MM3 = 500.0
 BED_MM = 0.01
+LEAST_BED_MM2 = 150.0
+"""Flat face on the bed: a square of 12 mm holds a part of this size to it."""
+
+STANDS_SHARE = 0.1
+"""How far inside its bed face a part's centre of mass lies, as a share of its height: it then
+stands by itself on a bed that leans by 5.7 degrees, and a nozzle does not tip it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,18 +49,49 @@ class WedgeShape:
 
 
 def shapes_of(wedge: Wedge) -> list[WedgeShape]:
-    """The ways to print a wedge that need no support on the outside, the lightest first.
+    """The ways to print a wedge that stand by themselves and need no support on the outside.
 
-    :class:`InputError` when base and seat cannot be joined.
+    The lightest first. :class:`InputError` when base and seat cannot be joined.
     """
-    found = [shape for shape in _candidates(wedge) if _steepest_deg(shape) <= STEEPEST_DEG]
-    if not found:
+    upright = [shape for shape in _candidates(wedge) if _steepest_deg(shape) <= STEEPEST_DEG]
+    if not upright:
         raise InputError(
             "wedge-shape",
             f"wedge {wedge.id} cannot be printed: its seat leans too far over its base",
             "make the base larger or turn it with the camera",
         )
+    found = [shape for shape in upright if stands(shape.corners_mm, _centre_of_mass(shape))]
+    if not found:
+        raise InputError(
+            "wedge-bed",
+            f"wedge {wedge.id} cannot be printed: it has no face to stand on by itself",
+            "make the base larger or turn it with the camera",
+        )
     return sorted(found, key=lambda shape: shape.volume_mm3)
+
+
+def stands(on_bed_mm: Floats, centre_mm: Floats) -> bool:
+    """Whether a part stands by itself on those of its points (N, 3) that are on the bed, z = 0.
+
+    Its centre of mass (3,) must lie well inside a face of some area.
+    """
+    from scipy.spatial import ConvexHull, QhullError
+
+    flat = on_bed_mm[on_bed_mm[:, 2] < BED_MM][:, :2]
+    try:
+        face = ConvexHull(flat)
+    except (QhullError, ValueError):
+        # A corner or an edge: nothing to stand on.
+        return False
+    inside = -(face.equations[:, :2] @ centre_mm[:2] + face.equations[:, 2]).max()
+    # Of a flat hull the "volume" is its area.
+    return bool(face.volume >= LEAST_BED_MM2 and inside >= STANDS_SHARE * centre_mm[2])
+
+
+def _centre_of_mass(shape: WedgeShape) -> Floats:
+    import trimesh
+
+    return np.asarray(trimesh.convex.convex_hull(shape.corners_mm).center_mass)
 
 
 def _candidates(wedge: Wedge) -> Iterator[WedgeShape]:
@@ -69,9 +106,12 @@ def _candidates(wedge: Wedge) -> Iterator[WedgeShape]:
         dropped[:, 2] = bed
         for points in (placed, np.concatenate([placed, dropped])):
             solid = _trimmed(points, axes, wedge)
+            vertices = solid.to_mesh64().vert_properties[:, :3]
+            # The seat's plane may have cut off what was lowest.
+            lowest = vertices[:, 2].min()
             matrix = np.eye(4)
-            matrix[:3, :3], matrix[2, 3] = axes, -bed
-            vertices = solid.to_mesh64().vert_properties[:, :3] - [0.0, 0.0, bed]
+            matrix[:3, :3], matrix[2, 3] = axes, -lowest
+            vertices = vertices - [0.0, 0.0, lowest]
             yield WedgeShape(matrix, vertices, solid.volume())
 
 

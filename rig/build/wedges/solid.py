@@ -11,7 +11,7 @@ from geometry.arrays import Floats
 from rig.build.mounts.structure import Wedge
 from rig.build.wedges.engraving import ENGRAVED_MM, engravings
 from rig.build.wedges.recipe import Bearing, PrintPart, Recess, engraved, screw_cuts
-from rig.build.wedges.shape import BED_MM, WedgeShape, shapes_of
+from rig.build.wedges.shape import BED_MM, LEAST_BED_MM2, WedgeShape, shapes_of, stands
 from rig.catalogue.catalogue import Catalogue
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ SLIVER_MM2 = 1e-4
 
 
 def print_part(wedge: Wedge, catalogue: Catalogue) -> PrintPart:
-    """How to print a wedge: the lightest shape that needs no support and holds its screws.
+    """How to print a wedge: the lightest shape that stands, needs no support and holds its screws.
 
     :class:`InputError` when there is none, or when the camera's name does not fit on it.
     """
@@ -49,6 +49,7 @@ def _printed(wedge: Wedge, shape: WedgeShape, catalogue: Catalogue) -> PrintPart
     solid = _carved(shape.corners_mm, cuts)
     _check_bearings(wedge.id, bearings, solid)
     _check_overhang(wedge.id, solid)
+    _check_stands(wedge.id, solid)
     rig_from_print = wedge.rig_from_base @ np.linalg.inv(shape.print_from_base)
     for place in engravings(wedge.camera, shape.corners_mm):
         name = engraved(place)
@@ -72,7 +73,7 @@ def _printed(wedge: Wedge, shape: WedgeShape, catalogue: Catalogue) -> PrintPart
 def wedge_mesh(part: PrintPart) -> trimesh.Trimesh:
     """The watertight mesh of a wedge in its print frame, millimetres.
 
-    :class:`InternalError` when it is not closed or would need support.
+    :class:`InternalError` when it is not closed, would need support or would not stand.
     """
     mesh = _mesh(_carved(part.corners_mm, part.cuts))
     if not (mesh.is_watertight and mesh.volume > 0.0):
@@ -82,6 +83,10 @@ def wedge_mesh(part: PrintPart) -> trimesh.Trimesh:
     if overhang_deg(mesh) > LARGEST_OVERHANG_DEG:
         raise InternalError(
             "wedge-overhang", f"wedge {part.name} would need support", "report the plan"
+        )
+    if not stands_on_bed(mesh):
+        raise InternalError(
+            "wedge-bed", f"wedge {part.name} would not stand on the bed", "report the plan"
         )
     return mesh
 
@@ -129,6 +134,23 @@ def _check_overhang(wedge_id: str, solid: Manifold) -> None:
             f"wedge {wedge_id} cannot be printed without support: its seat leans too far",
             "turn the camera, or its post",
         )
+
+
+def _check_stands(wedge_id: str, solid: Manifold) -> None:
+    """Holes and pockets may take the face away that a wedge would stand on."""
+    if not stands_on_bed(_mesh(solid)):
+        raise InputError(
+            "wedge-bed",
+            f"wedge {wedge_id} cannot be printed: with its holes it has no face to stand on",
+            "make the base larger or turn it with the camera",
+        )
+
+
+def stands_on_bed(mesh: trimesh.Trimesh) -> bool:
+    """Whether a part, z up, has a flat face on the bed and its centre of mass well inside it."""
+    on_bed = (mesh.vertices[mesh.faces][:, :, 2] < BED_MM).all(axis=1)
+    face_mm2 = float(mesh.area_faces[on_bed].sum())
+    return face_mm2 >= LEAST_BED_MM2 and stands(mesh.vertices, mesh.center_mass)
 
 
 def _mesh(solid: Manifold) -> trimesh.Trimesh:
