@@ -10,7 +10,7 @@ from common.errors import CancelledError, InputError
 from common.progress import CancelToken, NeverCancelled, Progress, ProgressCallback, ignore_progress
 from geometry.camera import RigCamera
 from geometry.subject import Subject
-from rig.build.mounts.clashes import find_clashes
+from rig.build.mounts.clashes import find_clashes, pairs
 from rig.build.mounts.plan import Figures, MountPlan, Price
 from rig.build.mounts.relaxing import relaxed
 from rig.build.mounts.rounding import Rounder, nearest, needs_rounding
@@ -135,6 +135,41 @@ def _must_stand(cameras: tuple[RigCamera, ...], around: Surroundings) -> None:
         )
 
 
+HOPELESS_MM = 30.0
+"""Making room and rounding move a camera by less than this: what overlaps by more stays so."""
+
+
+def _must_fit(free: tuple[RigCamera, ...], around: Surroundings) -> None:
+    """Raises :class:`InputError` where the cameras alone, as designed, leave no rig possible.
+
+    Asked before any mount is arranged: the search for places would end with the same verdict
+    after minutes.
+    """
+    everyone = (*free, *around.standing)
+    solids = tuple(s for camera in everyone for s in camera_solids(camera))
+    names = {camera.name for camera in free}
+    deep = [
+        clash
+        for clash in find_clashes(solids, pairs(), everyone, around)
+        if clash.clearance_mm < clash.required_mm - HOPELESS_MM and {clash.one, clash.other} & names
+    ]
+    if not deep:
+        return
+    worst = min(deep, key=lambda clash: clash.clearance_mm - clash.required_mm)
+    zones = {zone.name for zone in around.zones}
+    by_mm = worst.required_mm - worst.clearance_mm
+    what = "stands in the view of" if worst.kind == "view" else "reaches into"
+    remedy = "give the true sizes of the bodies, or design with more clearance between them"
+    if worst.one in zones:
+        remedy = f"keep the zone {worst.one} clear of the cameras, or design them outside it"
+    raise InputError(
+        "mount-hopeless",
+        f"no mount can hold these cameras: {worst.other} {what} {worst.one} by {by_mm:.0f} mm "
+        f"where the design puts it{f', and {len(deep) - 1} more' if len(deep) > 1 else ''}",
+        remedy,
+    )
+
+
 def make_plan(
     cameras: tuple[RigCamera, ...],
     subject: Subject,
@@ -160,6 +195,7 @@ def make_plan(
     standing = tuple(camera for camera in cameras if camera.fixed)
     around = spec.surroundings(subject, limits, standing)
     _must_stand(free, around)
+    _must_fit(free, around)
     naive = tuple(nearest(mount) for mount in spec.system.hold(free, around).mounts)
     roomy, spare = job.relaxed(spec)
     job.tell("arrange", 0.2)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Generic, TypeVar
 
 import numpy as np
@@ -26,6 +26,17 @@ PLATE_MM = 8.0
 STEM_SHARE = 0.5
 """Width of the stem between ball and camera plate, as a share of the head's."""
 
+_NEEDED = (
+    "pivot_mm",
+    "height_mm",
+    "width_mm",
+    "step_deg",
+    "pan_deg",
+    "tilt_deg",
+    "roll_deg",
+)
+"""Figures of a head that a mount needs."""
+
 _WORDS = {
     "pan": "straight ahead from the foot of the head, right positive seen from behind",
     "tilt": "level with the foot of the head, up positive",
@@ -43,26 +54,29 @@ class HeadKind:
     width_mm: float
     step_deg: float
     ranges_deg: tuple[tuple[float, float], ...]
+    others: tuple[HeadKind, ...] = ()
+    """The other heads of the catalogue, for advice where this one cannot hold a camera."""
 
     @classmethod
     def named(cls, wanted: str, catalogue: Catalogue) -> HeadKind:
         """From the catalogue; raises for one whose figures do not suffice."""
+        chosen = cls._of(wanted, catalogue)
+        others = [
+            cls._of(part.id, catalogue)
+            for part in catalogue.heads.values()
+            if part.id != chosen.part.id and all(getattr(part, key) is not None for key in _NEEDED)
+        ]
+        return replace(chosen, others=tuple(others))
+
+    @classmethod
+    def _of(cls, wanted: str, catalogue: Catalogue) -> HeadKind:
         part = pick(wanted, catalogue.heads, "head")
-        needed = (
-            "pivot_mm",
-            "height_mm",
-            "width_mm",
-            "step_deg",
-            "pan_deg",
-            "tilt_deg",
-            "roll_deg",
-        )
-        missing = [key for key in needed if getattr(part, key) is None]
+        missing = [key for key in _NEEDED if getattr(part, key) is None]
         if missing:
             complete = [
                 p.id
                 for p in catalogue.heads.values()
-                if all(getattr(p, key) is not None for key in needed)
+                if all(getattr(p, key) is not None for key in _NEEDED)
             ]
             raise InputError(
                 "head-incomplete",
@@ -144,6 +158,7 @@ def stances(
     A camera may be turned over; the way with more room to turn comes first on each base.
     Raises :class:`InputError` with the nearest angles the head has when there is none.
     """
+    bases = list(bases)
     found: list[Stance[FootT]] = []
     nearest: tuple[float, Stance[FootT]] | None = None
     for foot, base in bases:
@@ -158,10 +173,24 @@ def stances(
         found += [stance for margin, stance in options if margin >= head.step_deg]
     if found or nearest is None:
         return found
-    raise _out_of_reach(head, camera, nearest[1])
+    raise _out_of_reach(head, camera, nearest[1], _that_hold(head.others, camera, bases))
 
 
-def _out_of_reach(head: HeadKind, camera: RigCamera, stance: Stance[FootT]) -> InputError:
+def _that_hold(
+    heads: Iterable[HeadKind], camera: RigCamera, bases: Iterable[tuple[FootT, Floats]]
+) -> list[str]:
+    """Ids of the heads that can hold a camera on one of the bases."""
+    asked = [
+        head_angles(pose.rotation_rig_to_camera, base)
+        for _, base in bases
+        for pose in (camera.pose, turned_over(camera.pose))
+    ]
+    return [h.part.id for h in heads if any(h.margin_deg(a) >= h.step_deg for a in asked)]
+
+
+def _out_of_reach(
+    head: HeadKind, camera: RigCamera, stance: Stance[FootT], others: list[str]
+) -> InputError:
     pan, tilt, roll = stance.angles_deg
     reach = [
         # An angle that cannot be set has no room for a step at either end.
@@ -173,5 +202,9 @@ def _out_of_reach(head: HeadKind, camera: RigCamera, stance: Stance[FootT]) -> I
         f"head {head.part.id} cannot hold {camera.name}: it needs pan {pan:.1f}, tilt {tilt:.1f} "
         f"and roll {roll:.1f} degrees at best",
         f"the nearest it can do is pan {reach[0]:.1f}, tilt {reach[1]:.1f}, roll {reach[2]:.1f}: "
-        "choose a head with more range",
+        + (
+            f"choose head {' or '.join(others[:3])}, which can hold it"
+            if others
+            else "choose another mount, for no head of the catalogue can hold it"
+        ),
     )
