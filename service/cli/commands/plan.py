@@ -11,7 +11,7 @@ import typer
 from service.kinds.defaults import PAPER
 
 if TYPE_CHECKING:
-    from service.kinds.plan import PlanResult
+    from service.kinds.plan import PlanNetwork, PlanResult
 
 
 def plan(
@@ -74,18 +74,37 @@ def plan(
             )
             result = run_task(PLAN, request, {"design": design, "scan": head}, folder)
         _show(result, out, as_json=as_json)
-    if not result.buildable:
-        sys.stderr.write(f"rigwright: {_why(result)}\n")
+    why = why_not(result)
+    if why:
+        sys.stderr.write(f"rigwright: {why}\n")
         raise typer.Exit(EXIT_INFEASIBLE)
 
 
-def _why(result: PlanResult) -> str:
-    first, more = result.clashes[0], len(result.clashes) - 1
-    what = "stands in the view of" if first.kind == "view" else "is in the way of"
-    return (
-        f"{first.other} {what} {first.one}{f', and {more} more' if more else ''}; the plan "
-        "was written, but cannot be built so: try another mount or other zones"
-    )
+def why_not(result: PlanResult) -> str:
+    """Why the rig of a plan that was written should not be built so; empty for a sound one."""
+    if not result.price.designed.feasible:
+        return (
+            f"the design itself breaks its limits ({_broken(result.price.designed)}); the plan was "
+            "written, but its rig breaks them as well: design again"
+        )
+    if result.clashes:
+        first, more = result.clashes[0], len(result.clashes) - 1
+        what = "stands in the view of" if first.kind == "view" else "is in the way of"
+        return (
+            f"{first.other} {what} {first.one}{f', and {more} more' if more else ''}; the plan "
+            "was written, but cannot be built so: try another mount or other zones"
+        )
+    if not result.price.built.feasible:
+        return (
+            f"as it is set, the rig breaks limits ({_broken(result.price.built)}) that the design "
+            "keeps; the plan was written: try a mount with finer settings"
+        )
+    return ""
+
+
+def _broken(network: PlanNetwork) -> str:
+    shown, more = network.broken[:3], len(network.broken) - 3
+    return ", ".join(shown) + (f", and {more} more" if more > 0 else "")
 
 
 def _show(result: PlanResult, out: Path, *, as_json: bool) -> None:

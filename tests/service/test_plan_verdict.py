@@ -1,0 +1,67 @@
+"""What ``rigwright plan`` says of a rig that should not be built."""
+
+from __future__ import annotations
+
+import pytest
+
+from service.cli.commands.plan import why_not
+from service.kinds.plan import PlanClash, PlanNetwork, PlanPrice, PlanResult
+
+ROWS = ["coverage/2", "clearance/cam01/cam02", "focus/cam03", "frame/cam04"]
+
+
+def network(*broken: str) -> PlanNetwork:
+    return PlanNetwork(
+        sigma_median_mm=0.03,
+        sigma_p95_mm=0.05,
+        coverage_2_views=1.0,
+        coverage_3_views=0.98,
+        feasible=not broken,
+        broken=list(broken),
+    )
+
+
+def result(
+    *, designed: PlanNetwork, built: PlanNetwork, clashes: tuple[PlanClash, ...] = ()
+) -> PlanResult:
+    price = PlanPrice(
+        designed=designed, rounded=built, built=built, sigma_loss=0.01, coverage_loss=0.0
+    )
+    return PlanResult(
+        name="",
+        system="t-slot",
+        buildable=not clashes,
+        clashes=list(clashes),
+        price=price,
+        yield_share=1.0,
+        yield_trials=100,
+        tightest=[],
+        members=0,
+        member_length_mm=0.0,
+        plates=0,
+        wedges=0,
+        parts=0,
+        cameras=[],
+        steps=[],
+        notes=[],
+    )
+
+
+POST = PlanClash(kind="view", one="cam01", other="U2", clearance_mm=-3.0, required_mm=5.0)
+
+
+@pytest.mark.parametrize(
+    ("made", "words"),
+    [
+        (result(designed=network(*ROWS), built=network(*ROWS), clashes=(POST,)), "design itself"),
+        (result(designed=network(), built=network(), clashes=(POST,)), "U2 stands in the view"),
+        (result(designed=network(), built=network(ROWS[0])), "breaks limits (coverage/2) that"),
+        (result(designed=network(*ROWS), built=network()), "and 1 more"),
+    ],
+)
+def test_the_first_cause_is_told(made: PlanResult, words: str) -> None:
+    assert words in why_not(made)
+
+
+def test_a_sound_rig_gets_no_word() -> None:
+    assert not why_not(result(designed=network(), built=network()))
