@@ -13,7 +13,9 @@ from rig.build.drawings.figures import fixed
 from rig.build.mounts.settings import CameraMount, Link, Motion
 
 CHAIN_COLUMNS = ("Step", "x mm", "y mm", "z mm", "Turn z °", "x °", "y °", "Then")
-CHAIN_WORDS = "Step by step: go x, y, z; turn about z, the new x, the new y; then slide or turn"
+CHAIN_WORDS = (
+    "In each step: go x, y, z; turn about z, the new x, the new y; then slide or turn as set."
+)
 _AXES = {(1, 0, 0): "+x", (0, 1, 0): "+y", (0, 0, 1): "+z"} | {
     (-1, 0, 0): "-x", (0, -1, 0): "-y", (0, 0, -1): "-z"
 }  # fmt: skip

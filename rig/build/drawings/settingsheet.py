@@ -47,6 +47,7 @@ def _content(
         if table.rows:
             items += table_items(table, LEFT_MM, y, WIDE_MM)
             y -= table.height_mm() + 6.0
+    items.append(fitted(Text(CHAIN_WORDS, LEFT_MM, y + 1.5, 2.0), WIDE_MM))
     low = MARGIN_MM + BLOCK_MM[1] + 8.0
     for k, (title, (placed, ground)) in enumerate(maps.items()):
         x = LEFT_MM + k * (PICTURE_MM[0] + 8.0)
@@ -72,7 +73,7 @@ def _tables(plan: MountPlan, mount: CameraMount) -> list[Table]:
         Table("Check with a tape measure", TAPE_COLUMNS, tapes),
         Table("What results: optical centre from the datum", POSE_COLUMNS, (pose,)),
         Table(
-            f"From the datum to the optical centre. {CHAIN_WORDS}",
+            "Step by step from the datum to the optical centre",
             CHAIN_COLUMNS,
             chain_rows(mount, plan.datum_rig_mm),
         ),
