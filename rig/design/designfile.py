@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +11,7 @@ import numpy as np
 
 from common.errors import InputError, TooLargeError
 from common.files.strict import validated
+from common.version import program_version
 from geometry.arrays import Floats
 from geometry.camera import Body, Camera, RigCamera
 from geometry.frames import Pose, rotation_from_omega_phi_kappa
@@ -87,15 +87,6 @@ def evaluation_document(cameras: tuple[RigCamera, ...], quality: Quality) -> dic
         "constraints": constraint_figures(quality.constraints),
         "points": point_figures(quality),
     }
-
-
-def program_version() -> str:
-    """Version of the installed program."""
-    try:
-        return version("rigwright")
-    except PackageNotFoundError:
-        # A checkout that is run without being installed has no version of its own.
-        return "0"
 
 
 def scan_facts(scan: Scan, name: str) -> dict[str, Any]:

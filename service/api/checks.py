@@ -8,8 +8,6 @@ from fastapi import APIRouter, Response
 from fastapi.responses import HTMLResponse
 from pydantic import Field
 
-from calibration.files import CHECKS
-from calibration.report import history_of, history_page
 from service.api.calibrations import resource as calibrations
 from service.api.context import ServiceDep
 from service.api.job_routes import JobResource
@@ -19,6 +17,7 @@ from service.api.submission import Submission, asked, submit
 from service.kinds.base import Id, Model
 from service.kinds.check import CHECK, CheckOutcome, CheckRequest
 from service.store.jobrecords import JobInput
+from service.tasks.drifting import drift_page
 
 router = APIRouter(tags=["checks"])
 MOST_IN_HISTORY = 500
@@ -88,11 +87,11 @@ def _targets(service: ServiceDep, body: CheckBody) -> JobInput:
 def read_history(service: ServiceDep, job_id: str) -> HTMLResponse:
     """Read how a rig has drifted: a page with all checks against a calibration."""
     completed(service, job_id, calibrations.kind.name)
-    records = []
+    checks = []
     for job in service.store.jobs.completed_against(resource.kind.name, job_id, MOST_IN_HISTORY):
         files = {file.name: file.path for file in service.store.jobs.files(job.id)}
-        records.append(CHECKS.read(files["check.json"]))
-    return HTMLResponse(history_page(history_of(records, job_id)))
+        checks.append(files["check.json"])
+    return HTMLResponse(drift_page(checks, job_id))
 
 
 resource.add_to(router)

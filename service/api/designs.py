@@ -10,7 +10,7 @@ from pydantic import Field
 from service.api.context import ServiceDep
 from service.api.job_routes import JobResource
 from service.api.models import IdempotencyKeyHeader, Job, problems
-from service.api.submission import Submission, asked, rig_for_scan, submit
+from service.api.submission import Submission, asked, submit
 from service.kinds.base import Model
 from service.kinds.design import DESIGN, DesignRequest, DesignResult
 
@@ -51,8 +51,7 @@ def add_design(
 ) -> Job[DesignResult]:
     """Ask for a design. Limits that cannot be are refused at once."""
     scan = service.store.scans.get(body.scan_id)
-    request = asked(DesignRequest, body)
-    request = request.model_copy(update={"rig": rig_for_scan(request.rig, scan)})
+    request = asked(DesignRequest, body).for_scan(scan.options)
     request.spec()
     return submit(service, resource, Submission(request, scan), idempotency_key, response)
 

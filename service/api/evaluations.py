@@ -7,12 +7,10 @@ from typing import Annotated
 from fastapi import APIRouter, Response
 from pydantic import Field
 
-from rig.design.designfile import design_from_mapping
-from rig.design.designmodel import DesignFile
 from service.api.context import ServiceDep
 from service.api.job_routes import JobResource
 from service.api.models import IdempotencyKeyHeader, Job, problems
-from service.api.submission import Submission, rig_for_scan, submit
+from service.api.submission import Submission, submit
 from service.kinds.base import Model
 from service.kinds.evaluation import EVALUATION, EvaluationRequest, EvaluationResult
 
@@ -53,13 +51,7 @@ def add_evaluation(
 ) -> Job[EvaluationResult]:
     """Ask for an evaluation."""
     scan = service.store.scans.get(body.scan_id)
-    rig = rig_for_scan(body.rig, scan)
-    # Only what places the cameras: the figures of the old design would be stored for nothing.
-    placed = body.design.model_dump(
-        by_alias=True, exclude_unset=True, include={"schema_", "name", "cameras"}
-    )
-    design_from_mapping(placed, "design", rig.to_spec().camera)
-    request = EvaluationRequest(rig=rig, design=DesignFile.model_validate(placed))
+    request = body.placed_for_scan(scan.options)
     return submit(service, resource, Submission(request, scan), idempotency_key, response)
 
 

@@ -6,16 +6,18 @@ from pathlib import Path
 
 from fastapi import APIRouter, Response
 
-from calibration.exports import rig_cameras
-from calibration.files import read_calibration
-from geometry.exchange import FORMATS, export_files
-from rig.design.designfile import read_design
 from service.api.calibrations import resource as calibrations
 from service.api.context import ServiceDep
 from service.api.designs import resource as designs
 from service.api.models import problems
 from service.api.zipped import ZIP, zipped
 from service.kinds.base import Model
+from service.tasks.exporting import (
+    calibrated_cameras,
+    designed_cameras,
+    export_formats,
+    exported,
+)
 
 router = APIRouter(tags=["exports"])
 
@@ -60,7 +62,7 @@ def _formats(path: str) -> ExportList:
                 description=form.description,
                 href=f"{path}/{form.name}",
             )
-            for form in FORMATS.values()
+            for form in export_formats()
         ]
     )
 
@@ -73,7 +75,7 @@ def _formats(path: str) -> ExportList:
 def read_export(service: ServiceDep, job_id: str, form: str) -> Response:
     """Fetch a design's cameras as one program wants them, in a ZIP archive."""
     design = designs.file(service, job_id, "design.json")
-    return zipped(export_files(form, read_design(Path(design.path)).cameras), f"{form}.zip")
+    return zipped(exported(form, designed_cameras(Path(design.path))), f"{form}.zip")
 
 
 @router.get(
@@ -88,6 +90,5 @@ def read_calibration_export(service: ServiceDep, job_id: str, form: str) -> Resp
     """
     file = calibrations.file(service, job_id, "calibration.json")
     built = service.store.jobs.inputs(job_id).get("design")
-    like = () if built is None else read_design(built[1]).cameras
-    calibrated = read_calibration(Path(file.path)).calibration
-    return zipped(export_files(form, rig_cameras(calibrated.cameras, like)), f"{form}.zip")
+    cameras = calibrated_cameras(Path(file.path), None if built is None else built[1])
+    return zipped(exported(form, cameras), f"{form}.zip")

@@ -7,13 +7,11 @@ from typing import Annotated
 from pydantic import Field, model_validator
 
 from common.errors import ConflictError, NotFoundError
-from rig.acquisition.session.index import read_index
-from rig.acquisition.session.records import CaptureId
-from rig.acquisition.session.storage import Disk
 from service.api.context import Service
 from service.api.picturesets import KIND as PICTURE_SET
 from service.api.targetsets import KIND as TARGET_SET
 from service.kinds.base import Id, Model, RunContext
+from service.kinds.sessions import CaptureId
 from service.pictures.listing import pictures_in_session
 from service.store.jobrecords import JobInput, JobRecord
 from service.store.tables import utc_now
@@ -53,7 +51,6 @@ def picture_source(
         found = service.store.documents.get(PICTURE_SET, pictures.picture_set_id)
         return run, (found.as_input("pictures"),)
     folder = service.rigs.session_folder(str(pictures.session))
-    read_index(folder, Disk())
     pictures_in_session(folder, pictures.captures)
     return run.model_copy(update={"session": str(folder), "captures": pictures.captures}), ()
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from fastapi import APIRouter, Response
 
-from rig.catalogue import load_catalogue
 from service.api.context import ServiceDep
 from service.api.designs import resource as designs
 from service.api.job_routes import JobResource
@@ -54,7 +53,7 @@ def add_plan(
     design = completed(service, body.design_id, designs.kind.name)
     scan = service.store.scans.get(design.scan_id or "")
     request = asked(PlanRequest, body)
-    request.mount.checked(load_catalogue())
+    request.check()
     file = made_file(service, body.design_id, designs.kind.name, "design.json", "design")
     return submit(service, resource, Submission(request, scan, (file,)), idempotency_key, response)
 

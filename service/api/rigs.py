@@ -2,27 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Literal
 from urllib.parse import quote
 
 from fastapi import APIRouter
 
-from common.errors import RigwrightError
-from common.files.plain import plain
-from rig.acquisition.cameras.base import CameraHealth
-from rig.acquisition.capture.results import RigHealth
-from rig.acquisition.station.spec import CameraPlan
-from rig.acquisition.trigger.box import TriggerHealth
 from service.api.context import ServiceDep
 from service.api.models import Problem, problems
-from service.api.rigmodels import CameraStatus, RigList, RigStatus, TriggerStatus
+from service.api.rigmodels import RigList, RigStatus
 from service.kinds.rigs import CAPTURE, RIG_TEST
 from service.problems import problem_document
+from service.stations.status import camera_statuses, rig_state, trigger_status
 from service.stations.worker import StationWorker
 
 router = APIRouter(tags=["rigs"])
 _PLURALS = {CAPTURE.name: "captures", RIG_TEST.name: "rig-tests"}
-State = Literal["ready", "busy", "degraded", "closed"]
 
 
 def rig_path(name: str) -> str:
@@ -63,50 +56,15 @@ def reset_rig(service: ServiceDep, rig: str) -> RigStatus:
 def _document(worker: StationWorker) -> RigStatus:
     health, problem, doing = worker.health()
     own = rig_path(worker.name)
-    cameras = [
-        _camera(plan, None if health is None else health.cameras.get(plan.name))
-        for plan in worker.station.cameras
-    ]
     return RigStatus(
         name=worker.name,
-        status=_status(health, doing is not None, problem),
+        status=rig_state(health, doing is not None, problem),
         doing=None if doing is None else f"/v1/{_PLURALS[doing.kind]}/{doing.id}",
         problem=None if problem is None else Problem.model_validate(problem_document(problem)),
-        trigger=None if health is None or health.box is None else _trigger(health.box),
-        cameras=cameras,
+        trigger=trigger_status(health),
+        cameras=camera_statuses(worker.station, health),
         links={
             "self": own,
             **{word: f"{own}/{word}" for word in ("captures", "tests", "abort", "reset")},
         },
     )
-
-
-def _trigger(box: TriggerHealth) -> TriggerStatus:
-    return TriggerStatus.model_validate(plain(box))
-
-
-def _camera(plan: CameraPlan, health: CameraHealth | None) -> CameraStatus:
-    health = health or CameraHealth(connected=False, problem="the rig is not open")
-    return CameraStatus(
-        name=plan.name,
-        backend=plan.backend,
-        id=plan.id,
-        output=plan.output,
-        connected=health.connected,
-        armed=health.armed,
-        problem=health.problem,
-        counters=dict(health.counters),
-    )
-
-
-def _status(health: RigHealth | None, busy: bool, problem: RigwrightError | None) -> State:
-    if busy:
-        return "busy"
-    if health is None or problem is not None:
-        return "closed"
-    well = all(camera.connected for camera in health.cameras.values())
-    if health.box is not None:
-        well = (
-            well and health.box.state.value == "ready" and health.box.interlock_closed is not False
-        )
-    return "ready" if well else "degraded"

@@ -7,7 +7,7 @@ from typing import Literal
 
 from fastapi import APIRouter
 
-from rig.design.designfile import program_version
+from common.version import program_version
 from service.api.context import ServiceDep
 from service.kinds.base import Model
 from service.store.tables import JobStatus

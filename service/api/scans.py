@@ -7,12 +7,11 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Query, Request, Response
 from pydantic import AwareDatetime, Field
 
-from rig.specification.sections.subject import Axis
 from service.api.context import ServiceDep
 from service.api.models import Cursor, IdempotencyKeyHeader, Limit, problems
 from service.api.uploads import Upload, take_in
 from service.kinds.base import Model
-from service.kinds.imports import ScanFacts
+from service.kinds.imports import Axis, ScanFacts
 from service.store.scans import ScanRecord
 
 router = APIRouter(tags=["scans"])

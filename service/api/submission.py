@@ -10,7 +10,6 @@ from typing import Generic, TypeVar
 from fastapi import Response
 from pydantic import BaseModel
 
-from rig.specification.rigfile import RigFile
 from service.api.context import Service
 from service.api.job_routes import JobResource
 from service.api.models import Job
@@ -30,17 +29,6 @@ def asked(model: type[ModelT], body: ModelT) -> ModelT:
 
 def _keys(model: type[BaseModel]) -> set[str]:
     return set(model.model_fields)
-
-
-def rig_for_scan(rig: RigFile, scan: ScanRecord) -> RigFile:
-    """The rig, read with the scan's own options where it has none.
-
-    Raises :class:`~common.errors.InputError` when the whole makes no sense.
-    """
-    own = rig.scan.model_dump(exclude_unset=True)
-    told = {key: value for key, value in own.items() if value not in (None, "auto")}
-    section = rig.scan.model_validate({**scan.options, **told})
-    return rig.model_copy(update={"scan": section})
 
 
 @dataclass(frozen=True)

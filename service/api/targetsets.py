@@ -8,19 +8,20 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Response
 from pydantic import AwareDatetime, Field
 
-from calibration.targets.filekeys import TargetsModel
-from calibration.targets.files import read_targets, targets_of, targets_text
-from calibration.targets.kinds import TargetPlan
 from common.errors import NotFoundError
 from service.api.context import Service, ServiceDep
 from service.api.designs import resource as designs
 from service.api.models import Cursor, Limit, problems
 from service.kinds.base import Id, Model
 from service.kinds.defaults import PAGE
-from service.kinds.targets import SeenByCamera
+from service.kinds.targets import SeenByCamera, TargetsModel
 from service.store.documents import DocumentRecord
-from service.tasks.proposing import proposal_for, seen_by_cameras
-from service.tasks.sheets import sheets_of
+from service.tasks.targetsets import (
+    TargetFile,
+    given_targets,
+    proposed_targets,
+    sheets_of_file,
+)
 
 KIND = "target-set"
 PATH = "/v1/target-sets"
@@ -89,11 +90,11 @@ def _document(record: DocumentRecord) -> TargetSet:
     )
 
 
-def keep_targets(service: Service, plan: TargetPlan) -> tuple[DocumentRecord, bool]:
+def keep_targets(service: Service, targets: TargetFile) -> tuple[DocumentRecord, bool]:
     """Put a target set into the store; the flag tells whether it is new."""
-    report = {"name": plan.name, "carriers": {c.name: len(c.ids) for c in plan.carriers}}
+    report = {"name": targets.name, "carriers": dict(targets.carriers)}
     with service.store.files.stage(".toml") as staging:
-        staging.write(targets_text(plan).encode())
+        staging.write(targets.text.encode())
         return service.store.documents.add(KIND, staging.finish(), "targets.toml", report)
 
 
@@ -106,7 +107,7 @@ def keep_targets(service: Service, plan: TargetPlan) -> tuple[DocumentRecord, bo
 )
 def add_target_set(request: TargetsModel, response: Response, service: ServiceDep) -> TargetSet:
     """Add a target set: the structure of a target file, as JSON."""
-    record, new = keep_targets(service, targets_of(request))
+    record, new = keep_targets(service, given_targets(request))
     response.status_code = 201 if new else 200
     response.headers["Location"] = f"{PATH}/{record.id}"
     return _document(record)
@@ -120,12 +121,12 @@ def add_target_set(request: TargetsModel, response: Response, service: ServiceDe
 )
 def propose(request: ProposalRequest, response: Response, service: ServiceDep) -> ProposedTargets:
     """Add a target set that suits a design: sizes, numbers and places for its cameras."""
-    proposal = proposal_for(Path(designs.file(service, request.design_id, "design.json").path))
-    record, _ = keep_targets(service, proposal.plan)
+    proposal = proposed_targets(Path(designs.file(service, request.design_id, "design.json").path))
+    record, _ = keep_targets(service, proposal.targets)
     response.headers["Location"] = f"{PATH}/{record.id}"
     return ProposedTargets(
         target_set=_document(record),
-        cameras=seen_by_cameras(proposal),
+        cameras=list(proposal.cameras),
         notes=list(proposal.notes),
     )
 
@@ -174,7 +175,7 @@ def list_sheets(service: ServiceDep, target_set_id: str, page: Page = PAGE) -> S
             media_type=sheet.media_type,
             href=f"{PATH}/{target_set_id}/sheets/{sheet.name}",
         )
-        for sheet in sheets_of(_plan(service, target_set_id), page).values()
+        for sheet in sheets_of_file(_targets(service, target_set_id), page).values()
     ]
     return SheetList(items=items)
 
@@ -187,7 +188,7 @@ def list_sheets(service: ServiceDep, target_set_id: str, page: Page = PAGE) -> S
 )
 def read_sheet(service: ServiceDep, target_set_id: str, name: str, page: Page = PAGE) -> Response:
     """Fetch a sheet to print (PDF, SVG), or a picture of a carrier for simulations (PNG)."""
-    sheets = sheets_of(_plan(service, target_set_id), page)
+    sheets = sheets_of_file(_targets(service, target_set_id), page)
     if name not in sheets:
         raise NotFoundError(
             "file", f"the target set has no sheet {name!r}", f"see {PATH}/{target_set_id}/sheets"
@@ -201,6 +202,6 @@ def remove_target_set(service: ServiceDep, target_set_id: str) -> None:
     service.store.documents.remove(KIND, target_set_id)
 
 
-def _plan(service: Service, target_set_id: str) -> TargetPlan:
+def _targets(service: Service, target_set_id: str) -> Path:
     documents = service.store.documents
-    return read_targets(documents.path(documents.get(KIND, target_set_id)))
+    return documents.path(documents.get(KIND, target_set_id))

@@ -12,7 +12,6 @@ from anyio import CancelScope, to_thread
 from fastapi import Request
 
 from common.errors import InputError, InternalError, NotFoundError
-from rig.specification.sections.subject import ScanSection
 from service.api.context import Service
 from service.api.receiving import died, read_apart, receive
 from service.kinds.imports import SCAN_IMPORT, ScanFacts, ScanImportRequest
@@ -129,7 +128,7 @@ def _read(service: Service, staged: StagedFile, upload: Upload) -> ScanFacts:
         time_limit_s=settings.scan_time_limit_s,
         memory_limit_bytes=settings.scan_memory_limit_bytes,
     )
-    request = ScanImportRequest(options=ScanSection.model_validate(upload.options))
+    request = ScanImportRequest.reading(upload.options)
     name = plain_name(upload.filename)
     try:
         return read_apart(service, kind, request, staged, name)

@@ -43,7 +43,7 @@ app = typer.Typer(
 
 def _print_version(wanted: bool) -> None:
     if wanted:
-        from rig.design.designfile import program_version
+        from common.version import program_version
 
         typer.echo(f"rigwright {program_version()}")
         raise typer.Exit

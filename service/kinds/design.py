@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from collections.abc import Mapping
+from typing import Annotated, Self
 
 from pydantic import Field
 
@@ -10,6 +11,7 @@ from rig.specification.rigfile import RigFile
 from rig.specification.spec import RigSpec
 from service.kinds.base import LARGEST_JSON_INTEGER, Figure, JobKind, Request, Result
 from service.kinds.evaluation import EvaluationResult
+from service.kinds.scanned import rig_for_scan
 
 
 class DesignRequest(Request):
@@ -21,6 +23,10 @@ class DesignRequest(Request):
     ] = None
     seed: Annotated[int | None, Field(ge=0, le=LARGEST_JSON_INTEGER)] = None
     starts: Annotated[int | None, Field(ge=1, le=1000, description="Starts to try.")] = None
+
+    def for_scan(self, options: Mapping[str, str | float]) -> Self:
+        """The same, the scan read with its own ``options`` where the rig has none."""
+        return self.model_copy(update={"rig": rig_for_scan(self.rig, options)})
 
     def spec(self) -> RigSpec:
         """The rig with what is asked for instead. Raises :class:`InputError`."""

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated
 
 from pydantic import Field
 
+from rig.design.designfile import design_from_mapping
 from rig.design.designmodel import DesignFile
 from rig.specification.rigfile import RigFile
 from service.kinds.base import Figure, JobKind, Note, Request, Result
+from service.kinds.scanned import rig_for_scan
 
 
 class EvaluationRequest(Request):
@@ -21,6 +24,19 @@ class EvaluationRequest(Request):
             description="A design document; of an existing rig `schema` and `cameras` are enough."
         ),
     ]
+
+    def placed_for_scan(self, options: Mapping[str, str | float]) -> EvaluationRequest:
+        """Only what places the cameras, the scan read with its own ``options``.
+
+        The figures of the old design would be stored for nothing. Raises
+        :class:`~common.errors.InputError` for cameras that make no sense.
+        """
+        rig = rig_for_scan(self.rig, options)
+        placed = self.design.model_dump(
+            by_alias=True, exclude_unset=True, include={"schema_", "name", "cameras"}
+        )
+        design_from_mapping(placed, "design", rig.to_spec().camera)
+        return EvaluationRequest(rig=rig, design=DesignFile.model_validate(placed))
 
 
 class Coverage(Result):

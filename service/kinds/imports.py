@@ -2,18 +2,34 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from collections.abc import Mapping
+from typing import Annotated, Self
 
 from pydantic import Field
 
-from rig.specification.sections.subject import ScanSection
+from rig.specification.sections.subject import Axis, ScanSection
 from service.kinds.base import JobKind, Note, Request, Result
+
+__all__ = [
+    "PICTURES_IMPORT",
+    "SCAN_IMPORT",
+    "Axis",
+    "PictureFacts",
+    "PicturesImportRequest",
+    "ScanFacts",
+    "ScanImportRequest",
+]
 
 
 class ScanImportRequest(Request):
     """How to read a scan."""
 
     options: ScanSection
+
+    @classmethod
+    def reading(cls, options: Mapping[str, str | float]) -> Self:
+        """A scan read with the named ``options`` of a rig file's ``[scan]``."""
+        return cls(options=ScanSection.model_validate(options))
 
 
 class ScanFacts(Result):

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from rig.build.mounts.systemfile import SystemFile
+from rig.catalogue import load_catalogue
 from service.kinds.base import LARGEST_JSON_INTEGER, Figure, JobKind, Request, Result
 from service.kinds.defaults import PAPER
 
@@ -24,6 +25,10 @@ class PlanRequest(Request):
     ] = 0
     paper: Annotated[Paper, Field(description="Of drilling templates.")] = PAPER
     step: Annotated[bool, Field(description="Write printed parts as STEP too.")] = False
+
+    def check(self) -> None:
+        """Raise :class:`~common.errors.InputError` for parts that there are not."""
+        self.mount.checked(load_catalogue())
 
 
 class PlanNetwork(Result):

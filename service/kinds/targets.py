@@ -6,8 +6,18 @@ from typing import Annotated
 
 from pydantic import Field
 
+from calibration.targets.filekeys import TargetsModel
 from service.kinds.base import JobKind, Request, Result
 from service.kinds.defaults import PAGE
+
+__all__ = [
+    "TARGETS",
+    "CarrierLine",
+    "SeenByCamera",
+    "TargetsModel",
+    "TargetsRequest",
+    "TargetsResult",
+]
 
 
 class TargetsRequest(Request):

@@ -16,6 +16,7 @@ from typing import Self
 
 from common.errors import ConflictError, InputError, NotFoundError
 from common.files.lock import KernelLock, LockHeldError, lock_folder
+from common.version import program_version
 from rig.acquisition.session import paths
 from rig.acquisition.session.commit import write_index
 from rig.acquisition.session.index import SessionIndex, read_index
@@ -23,7 +24,6 @@ from rig.acquisition.session.jsonfiles import entry
 from rig.acquisition.session.records import CaptureRecord, InterruptedEntry, SessionFile
 from rig.acquisition.session.recovery import Recovery, recover_index
 from rig.acquisition.session.storage import Disk, disk_errors
-from rig.design.designfile import program_version
 
 CAPTURE_ID = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
 MEGABYTE = 1e6

@@ -10,6 +10,7 @@ import numpy as np
 
 from common.errors import InputError, TooLargeError
 from common.files.strict import validated
+from common.version import program_version
 from geometry.frames import Pose
 from geometry.rotations import nearest_rotation
 from rig.build.mounts.plan import MountPlan
@@ -27,7 +28,7 @@ from rig.build.mounts.planmodel import (
 )
 from rig.build.mounts.settings import CameraMount
 from rig.build.mounts.structuremodel import StructureModel
-from rig.design.designfile import design_from_mapping, placed_camera, program_version
+from rig.design.designfile import design_from_mapping, placed_camera
 
 LARGEST_FILE_BYTES = 200_000_000
 

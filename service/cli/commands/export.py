@@ -74,22 +74,19 @@ def run_export_command(
 
 
 def _cameras(given: Path, design: Path | None) -> tuple[RigCamera, ...]:
-    from calibration.exports import rig_cameras
-    from calibration.files import read_calibration
     from common.errors import InputError
-    from rig.design.designfile import read_design
+    from service.tasks.exporting import calibrated_cameras, designed_cameras
 
     path = _file_in(given)
     if _schema(path).startswith("rigwright.calibration/"):
-        like = read_design(design).cameras if design is not None else ()
-        return rig_cameras(read_calibration(path).calibration.cameras, tuple(like))
+        return calibrated_cameras(path, design)
     if design is not None:
         raise InputError(
             "export-design",
             f"{path} is no calibration",
             "leave --design out",
         )
-    return tuple(read_design(path).cameras)
+    return designed_cameras(path)
 
 
 def _file_in(given: Path) -> Path:

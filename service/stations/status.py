@@ -1,0 +1,85 @@
+"""How a rig and its devices are, as it is told: nothing of this asks the devices."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from common.errors import RigwrightError
+from common.files.plain import plain
+from rig.acquisition.cameras.base import CameraHealth
+from rig.acquisition.capture.results import RigHealth
+from rig.acquisition.station.spec import CameraPlan, Station
+from service.kinds.base import Figure, Model
+
+State = Literal["ready", "busy", "degraded", "closed"]
+
+
+class TriggerStatus(Model):
+    """How the trigger box and its line are."""
+
+    state: str
+    identity: str
+    serial_number: str
+    firmware: str
+    boots: int | None
+    interlock_closed: bool | None
+    armed_capture: str | None
+    clock_residual_us: Figure
+    round_trip_p50_ms: Figure
+    round_trip_p99_ms: Figure
+    counters: dict[str, int]
+    last_problem: str
+
+
+class CameraStatus(Model):
+    """How a camera is; `problem` is empty when all is well."""
+
+    name: str
+    backend: str
+    id: str
+    output: int | None
+    connected: bool
+    armed: bool
+    problem: str
+    counters: dict[str, int]
+
+
+def trigger_status(health: RigHealth | None) -> TriggerStatus | None:
+    """The trigger box; None where the station has none or is not open."""
+    if health is None or health.box is None:
+        return None
+    return TriggerStatus.model_validate(plain(health.box))
+
+
+def camera_statuses(station: Station, health: RigHealth | None) -> list[CameraStatus]:
+    """Each camera of the station, in its order."""
+    known = {} if health is None else health.cameras
+    return [_camera(plan, known.get(plan.name)) for plan in station.cameras]
+
+
+def rig_state(health: RigHealth | None, busy: bool, problem: RigwrightError | None) -> State:
+    """The rig as a whole."""
+    if busy:
+        return "busy"
+    if health is None or problem is not None:
+        return "closed"
+    well = all(camera.connected for camera in health.cameras.values())
+    if health.box is not None:
+        well = (
+            well and health.box.state.value == "ready" and health.box.interlock_closed is not False
+        )
+    return "ready" if well else "degraded"
+
+
+def _camera(plan: CameraPlan, health: CameraHealth | None) -> CameraStatus:
+    health = health or CameraHealth(connected=False, problem="the rig is not open")
+    return CameraStatus(
+        name=plan.name,
+        backend=plan.backend,
+        id=plan.id,
+        output=plan.output,
+        connected=health.connected,
+        armed=health.armed,
+        problem=health.problem,
+        counters=dict(health.counters),
+    )
