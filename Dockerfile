@@ -1,13 +1,16 @@
-FROM python:3.11-slim AS build
+# The tag names a release of Python and of Debian, so that a build today is the build of tomorrow.
+FROM python:3.11.13-slim-bookworm AS build
 WORKDIR /src
 COPY . .
-RUN pip install --no-cache-dir build && python -m build --wheel --outdir /wheels
+RUN pip install --no-cache-dir build -c constraints.txt \
+    && python -m build --wheel --outdir /wheels && cp constraints.txt /wheels
 
-FROM python:3.11-slim
+FROM python:3.11.13-slim-bookworm
 COPY --from=build /wheels /wheels
-RUN pip install --no-cache-dir /wheels/*.whl && rm -r /wheels \
-    && useradd --create-home --uid 10001 rigwright \
-    && install -d -o rigwright -g rigwright /data
+# The versions that the tests ran with.
+RUN pip install --no-cache-dir -c /wheels/constraints.txt /wheels/*.whl && rm -r /wheels \
+    && useradd --create-home --uid 10001 --groups dialout,video rigwright \
+    && install -d -o rigwright -g rigwright /data /station
 USER rigwright
 ENV RIGWRIGHT_HOST=0.0.0.0 RIGWRIGHT_PORT=8000 RIGWRIGHT_DATA_DIR=/data
 VOLUME /data

@@ -8,13 +8,44 @@ import socket
 from collections.abc import Callable
 from types import FrameType
 
+import h11
 import uvicorn
 from fastapi import FastAPI
+from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from common.errors import InputError
 from service.api.context import Service
 
-_GRACE_S = 5
+_GRACE_S = 2
+"""Open requests hear of the stop within a quarter of a second; this is for their last answers."""
+
+HEADER_S = 10.0
+"""How long the head of a request may take; a connection without one is let go."""
+
+
+class _Http(H11Protocol):
+    """Lets go of connections that never finish the head of a request: nothing else would."""
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        super().connection_made(transport)
+        self._head_in_time = self.loop.call_later(HEADER_S, self._let_go)
+
+    def handle_events(self) -> None:
+        super().handle_events()
+        begun = self.cycle is not None and not self.cycle.response_complete
+        partial = self.conn.their_state is h11.IDLE and bool(self.conn.trailing_data[0])
+        if begun or not partial:
+            self._head_in_time.cancel()
+        elif self._head_in_time.cancelled():
+            self._head_in_time = self.loop.call_later(HEADER_S, self._let_go)
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        self._head_in_time.cancel()
+        super().connection_lost(exc)
+
+    def _let_go(self) -> None:
+        if not self.transport.is_closing():
+            self.transport.close()
 
 
 class _Server(uvicorn.Server):
@@ -54,7 +85,12 @@ def serve(service: Service, app: FastAPI, ready: Callable[[str], None]) -> None:
     settings = service.settings
     listening = _listen(settings.host, settings.port)
     config = uvicorn.Config(
-        app, log_config=None, access_log=False, timeout_graceful_shutdown=_GRACE_S, lifespan="on"
+        app,
+        log_config=None,
+        access_log=False,
+        timeout_graceful_shutdown=_GRACE_S,
+        lifespan="on",
+        http=_Http,
     )
     with listening:
         asyncio.run(_Server(config, service, ready).serve([listening]))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import socket
 from pathlib import Path
 from typing import Annotated
 
@@ -31,6 +32,22 @@ class Settings(BaseSettings):
     port: Annotated[
         int, Field(ge=0, le=65535, description="Port to listen on; 0 takes a free one.")
     ] = 8000
+    allowed_hosts: Annotated[
+        tuple[str, ...],
+        NoDecode,
+        Field(
+            description="Names under which the service may be asked, separated by commas, besides "
+            "its address, `localhost` and this machine's name."
+        ),
+    ] = ()
+    allowed_origins: Annotated[
+        tuple[str, ...],
+        NoDecode,
+        Field(
+            description="Origins of other web pages that may change something, separated by "
+            "commas, such as `http://lab.example:3000`."
+        ),
+    ] = ()
     data_dir: Annotated[Path, Field(description="Folder for everything the service keeps.")] = (
         Field(default_factory=default_data_folder)
     )
@@ -70,6 +87,19 @@ class Settings(BaseSettings):
         if isinstance(given, str):
             return [part for part in given.split(os.pathsep) if part]
         return given
+
+    @field_validator("allowed_hosts", "allowed_origins", mode="before")
+    @classmethod
+    def _listed(cls, given: object) -> object:
+        if isinstance(given, str):
+            return [part.strip() for part in given.split(",") if part.strip()]
+        return given
+
+    @property
+    def known_hosts(self) -> tuple[str, ...]:
+        """All names under which the service may be asked."""
+        machine = socket.gethostname()
+        return ("localhost", machine, f"{machine}.local", self.host, *self.allowed_hosts)
 
     @property
     def sessions_folder(self) -> Path:

@@ -29,8 +29,10 @@ from service.api import (
 )
 from service.api.context import Service
 from service.api.errors import install_error_handlers
-from service.api.middleware import JsonLimit, RequestLog
-from service.api.models import Problem
+from service.api.gate import Gate
+from service.api.limits import PAUSE_S, BodyLimits
+from service.api.middleware import RequestLog
+from service.api.models import Problem, problems
 
 _DESCRIPTION = (
     "Designs and runs multi-camera rigs that photograph a face. Lengths are in millimetres, angles "
@@ -49,6 +51,8 @@ def make_app() -> FastAPI:
         lifespan=_lifespan,
         docs_url=None,
         redoc_url=None,
+        # A redirect would name the host that was asked for.
+        redirect_slashes=False,
     )
     resources = (
         *(root, scans, designs, exports, plans, evaluations),
@@ -59,8 +63,6 @@ def make_app() -> FastAPI:
     for router in app.state.routers:
         app.include_router(router)
     install_error_handlers(app)
-    app.add_middleware(JsonLimit)
-    app.add_middleware(RequestLog)
     app.openapi = lambda: _openapi(app)  # type: ignore[method-assign]
     return app
 
@@ -69,6 +71,11 @@ def create_app(service: Service) -> FastAPI:
     """The application of a service, which is started and stopped with it, but not closed."""
     app = make_app()
     app.state.service = service
+    settings = service.settings
+    # The last that is added is the first that a request meets.
+    app.add_middleware(BodyLimits, stopping=service.stopping.is_set, pause_s=PAUSE_S)
+    app.add_middleware(Gate, hosts=settings.known_hosts, origins=settings.allowed_origins)
+    app.add_middleware(RequestLog)
     return app
 
 
@@ -90,9 +97,18 @@ def _openapi(app: FastAPI) -> dict[str, Any]:
         schemas.update(problem.pop("$defs", {}))
         schemas["Problem"] = problem
         _drop_the_framework_errors(document)
+        _add_the_answers_of_the_gate(document)
         document["components"]["schemas"] = dict(sorted(schemas.items()))
         app.openapi_schema = document
     return app.openapi_schema
+
+
+def _add_the_answers_of_the_gate(document: dict[str, Any]) -> None:
+    for path in document["paths"].values():
+        for method, operation in path.items():
+            statuses = (403, 408, 413, 415, 421, 503) if method != "get" else (421, 503)
+            for status, answer in problems(*statuses).items():
+                operation["responses"].setdefault(str(status), answer)
 
 
 def _drop_the_framework_errors(document: dict[str, Any]) -> None:

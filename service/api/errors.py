@@ -16,9 +16,17 @@ from common.errors import InputError, InternalError, RigwrightError
 from common.files.strict import unknown_key
 from service.ipc import error_from_fields
 from service.logs import log
-from service.problems import HTTP_ERRORS, MEDIA_TYPE, problem_document
+from service.problems import HTTP_ERRORS, MEDIA_TYPE, problem_document, status_of
 
 _RETRY_AFTER_S = "5"
+
+
+class Refusal(HTTPException):
+    """An error that reading a body meets: only HTTP errors come through the framework whole."""
+
+    def __init__(self, error: RigwrightError) -> None:
+        super().__init__(status_of(error), error.problem)
+        self.error = error
 
 
 def install_error_handlers(app: FastAPI) -> None:
@@ -39,7 +47,7 @@ def answer(error: RigwrightError, **more: object) -> JSONResponse:
     )
     if response.status_code == 503:
         response.headers["Retry-After"] = _RETRY_AFTER_S
-    if response.status_code == 413:
+    if response.status_code in (403, 408, 413, 415, 421):
         # The rest of the body is not read, so nothing else can come on this connection.
         response.headers["Connection"] = "close"
     return response
@@ -88,6 +96,8 @@ def _nearest_key(request: Request, location: tuple[int | str, ...]) -> str:
 def _http_error(request: Request, error: Exception) -> JSONResponse:
     if not isinstance(error, HTTPException):
         raise error
+    if isinstance(error, Refusal):
+        return answer(error.error)
     kind, detail, remedy = HTTP_ERRORS.get(error.status_code, HTTP_ERRORS[400])
     response = answer(
         error_from_fields(

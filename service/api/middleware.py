@@ -1,4 +1,4 @@
-"""Around every request: an id, a line in the log, a limit to the size of JSON bodies."""
+"""Around every request: an id, and a line in the log."""
 
 from __future__ import annotations
 
@@ -7,15 +7,11 @@ import secrets
 import time
 
 from starlette.datastructures import Headers, MutableHeaders
-from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.logs import log, request_id
 
-LARGEST_JSON_BYTES = 64 << 20
-"""A design document with its thousands of points has a few megabytes."""
-
-_SOUND_ID = re.compile(r"^[A-Za-z0-9._-]{1,64}$")
+_SOUND_ID = re.compile(r"[A-Za-z0-9._-]{1,64}")
 
 
 class RequestLog:
@@ -30,7 +26,7 @@ class RequestLog:
             await self._app(scope, receive, send)
             return
         given = Headers(scope=scope).get("x-request-id", "")
-        own = given if _SOUND_ID.match(given) else secrets.token_hex(8)
+        own = given if _SOUND_ID.fullmatch(given) else secrets.token_hex(8)
         began_s, status = time.monotonic(), 0
 
         async def send_marked(message: Message) -> None:
@@ -39,7 +35,6 @@ class RequestLog:
                 status = message["status"]
                 headers = MutableHeaders(scope=message)
                 headers["X-Request-ID"] = own
-                headers["X-Content-Type-Options"] = "nosniff"
             await send(message)
 
         token = request_id.set(own)
@@ -54,28 +49,3 @@ class RequestLog:
             }
             log.info("request", extra={"fields": fields})
             request_id.reset(token)
-
-
-class JsonLimit:
-    """ASGI middleware. JSON is parsed in memory, so there must be an end to it.
-
-    Uploads of scans are not JSON; they are written to disk as they come and have their own limit.
-    """
-
-    def __init__(self, app: ASGIApp) -> None:
-        self._app = app
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Handle one request."""
-        received = 0
-
-        async def receive_some() -> Message:
-            nonlocal received
-            message = await receive()
-            received += len(message.get("body", b""))
-            if received > LARGEST_JSON_BYTES:
-                raise HTTPException(413, "the body is larger than a request may be")
-            return message
-
-        json = scope["type"] == "http" and "json" in Headers(scope=scope).get("content-type", "")
-        await self._app(scope, receive_some if json else receive, send)

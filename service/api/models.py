@@ -114,10 +114,13 @@ def problems(*statuses: int) -> Responses:
 
 _MEANING = {
     400: "The request is not well formed.",
+    403: "A web page of another origin, or one that did not have to ask, may not change anything.",
     404: "There is no such thing.",
+    408: "The body did not come in time.",
     409: "Not possible in the present state.",
     413: "What was sent is too large.",
     415: "This media type is not accepted.",
+    421: "The service is not called by this name.",
     423: "The interlock is open: nothing may fire.",
     422: "What was sent cannot be used; the detail says what to change.",
     503: "A device is missing, too much work is waiting, or the service is stopping; try again "

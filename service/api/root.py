@@ -8,8 +8,9 @@ from typing import Literal
 from fastapi import APIRouter
 
 from common.version import program_version
-from service.api.context import ServiceDep
+from service.api.context import Service, ServiceDep
 from service.kinds.base import Model
+from service.stations.worker import GONE, StationWorker
 from service.store.tables import JobStatus
 
 router = APIRouter(tags=["service"])
@@ -68,6 +69,31 @@ def read_service(service: ServiceDep) -> ServiceDocument:
     )
 
 
+def _rigs(service: Service) -> dict[str, Subsystem]:
+    """Each rig with its box and its cameras."""
+    return {f"rig {worker.name}": _rig(worker) for worker in service.rigs.all()}
+
+
+def _rig(worker: StationWorker) -> Subsystem:
+    health, problem, _ = worker.health()
+    if health is None:
+        why = "it is being opened" if problem is None else str(problem)
+        return Subsystem(status="degraded", reason=why)
+    wrong = [
+        f"camera {name}: {camera.problem or 'not connected'}"
+        for name, camera in health.cameras.items()
+        if not camera.connected
+    ]
+    box = health.box
+    if box is not None and box.state in GONE:
+        wrong.insert(0, f"trigger box: {box.last_problem or box.state.value}")
+    if box is not None and box.interlock_closed is False:
+        wrong.insert(0, "the interlock is open")
+    if wrong:
+        return Subsystem(status="degraded", reason="; ".join(wrong))
+    return Subsystem(status="ok")
+
+
 @router.get("/v1/health", response_model=Health)
 def read_health(service: ServiceDep) -> Health:
     """Read how the parts of the service are."""
@@ -84,7 +110,13 @@ def read_health(service: ServiceDep) -> Health:
         if waiting < service.settings.max_queued_jobs
         else Subsystem(status="degraded", reason="no more jobs are accepted for now")
     )
-    parts = {"store": Subsystem(status="ok"), "disk": disk, "jobs": jobs}
+    refused = service.store.database.refused
+    store = (
+        Subsystem(status="degraded", reason=f"it cannot be written ({refused})")
+        if refused
+        else Subsystem(status="ok")
+    )
+    parts = {"store": store, "disk": disk, "jobs": jobs, **_rigs(service)}
     degraded = any(part.status == "degraded" for part in parts.values())
     return Health(
         status="degraded" if degraded else "ok",

@@ -20,8 +20,8 @@ from service.store.blobs import StagedFile
 from service.store.idempotency import IdempotencyKey, StoredAnswer
 from service.store.scans import ScanRecord, plain_name, scan_identity
 
-_SUFFIX = re.compile(r"^\.[a-z0-9]{1,8}$")
-_MEDIA_TYPE = re.compile(r"^[\w.+-]{1,80}/[\w.+-]{1,80}$")
+_SUFFIX = re.compile(r"\.[a-z0-9]{1,8}")
+_MEDIA_TYPE = re.compile(r"[\w.+-]{1,80}/[\w.+-]{1,80}")
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Upload:
     ) -> Upload:
         """From the request's line and headers. Raises :class:`InputError`."""
         name = PurePosixPath(filename.replace("\\", "/")).name
-        if not _SUFFIX.match(PurePosixPath(name).suffix.lower()):
+        if not _SUFFIX.fullmatch(PurePosixPath(name).suffix.lower()):
             raise InputError(
                 "scan-name",
                 f"the file name {name!r} does not tell what kind of file it is",
@@ -52,7 +52,7 @@ class Upload:
                 "a scan is sent as it is, not as a form",
                 "send the file's bytes as the body, as with curl --data-binary @FILE",
             )
-        if not _MEDIA_TYPE.match(media_type):
+        if not _MEDIA_TYPE.fullmatch(media_type):
             media_type = "application/octet-stream"
         return cls(name, media_type, options, IdempotencyKey("scans", key) if key else None)
 

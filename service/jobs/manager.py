@@ -25,12 +25,13 @@ from service.ipc import error_fields
 from service.jobs.cancels import Cancels
 from service.jobs.engine import Engine, Task
 from service.jobs.notifier import Notifier
+from service.jobs.writing import RETRY_S, write_at_last
 from service.kinds.base import JobKind, Result
 from service.store import Store, interrupted
+from service.store.blobs import StagedFile
 from service.store.jobrecords import JobRecord
 from service.store.tables import JobStatus
 
-_RETRY_S = 1.0
 _MEDIA_TYPES = mimetypes.MimeTypes()
 for _ending, _media_type in (
     (".glb", "model/gltf-binary"),
@@ -58,7 +59,7 @@ class JobManager:
         self._kinds = kinds
         self._notifier = notifier
         self._news = threading.Condition()
-        self._stopping = False
+        self._stopping = threading.Event()
         self._cancels = cancels
         self._drivers = [
             threading.Thread(target=self._drive, name=f"job-driver-{n}", daemon=True)
@@ -78,7 +79,7 @@ class JobManager:
     def stop(self) -> None:
         """Stop what runs and mark it interrupted. What is pending begins at the next start."""
         with self._news:
-            self._stopping = True
+            self._stopping.set()
             self._news.notify_all()
         self._cancels.stop_all()
         for driver in self._drivers:
@@ -96,13 +97,13 @@ class JobManager:
 
     def _next(self) -> JobRecord | None:
         with self._news:
-            while not self._stopping:
+            while not self._stopping.is_set():
                 try:
                     job = self._store.jobs.claim_next()
                 except SQLAlchemyError:
                     # A full disk, most likely: jobs go on when there is room again.
                     logs.log.exception("the store cannot be written")
-                    self._news.wait(_RETRY_S)
+                    self._news.wait(RETRY_S)
                     continue
                 if job is not None:
                     return job
@@ -115,20 +116,24 @@ class JobManager:
         folder = self._store.work_folder(job.id)
         try:
             with self._cancels.running(job.id) as cancel:
-                if self._stopping:
+                if self._stopping.is_set():
                     cancel.set()
                 self._keep(job, self._work(job, folder, cancel), folder / "files")
         except RigwrightError as error:
-            end_without_result(self._store, job.id, error)
+            failed = error
+            write_at_last(lambda: end_without_result(self._store, job.id, failed), self._stopping)
         finally:
             shutil.rmtree(folder, ignore_errors=True)
             self._notifier.notify(job.id)
 
     def _give_up(self, job: JobRecord) -> None:
         lost = InternalError("job-lost", "the job could not be finished", "see the log")
+        jobs = self._store.jobs
         # Where even this cannot be written, the next start finds the job and marks it.
         with suppress(SQLAlchemyError):
-            self._store.jobs.end(job.id, JobStatus.FAILED, error_fields(lost))
+            write_at_last(
+                lambda: jobs.end(job.id, JobStatus.FAILED, error_fields(lost)), self._stopping
+            )
             self._notifier.notify(job.id)
 
     def _kind(self, job: JobRecord) -> JobKind[Any, Any]:
@@ -146,7 +151,9 @@ class JobManager:
         (folder / "files").mkdir()
 
         def report(progress: Progress, /) -> None:
-            self._store.jobs.record_progress(job.id, plain(progress))
+            # How far a job is may go unwritten; what comes of it may not.
+            with suppress(SQLAlchemyError):
+                self._store.jobs.record_progress(job.id, plain(progress))
             self._notifier.notify(job.id)
 
         inputs = self._inputs(job, folder)
@@ -173,7 +180,15 @@ class JobManager:
         return links
 
     def _keep(self, job: JobRecord, result: Result, folder: Path) -> None:
-        files = {
+        """Write down a result with its files; while the disk is full, until it is not."""
+        row = self._kind(job).result_row(result)
+        # Once: an attempt that fails may have moved files to their places already.
+        files = write_at_last(lambda: self._staged(folder), self._stopping)
+        write_at_last(lambda: self._store.jobs.complete(job.id, row, files), self._stopping)
+        logs.log.info("job completed")
+
+    def _staged(self, folder: Path) -> dict[str, tuple[StagedFile, str]]:
+        return {
             path.relative_to(folder).as_posix(): (
                 self._store.files.stage_existing(path),
                 _MEDIA_TYPES.guess_type(path.name)[0] or "application/octet-stream",
@@ -181,8 +196,6 @@ class JobManager:
             for path in sorted(folder.rglob("*"))
             if path.is_file()
         }
-        self._store.jobs.complete(job.id, self._kind(job).result_row(result), files)
-        logs.log.info("job completed")
 
 
 def end_without_result(store: Store, job_id: str, error: RigwrightError) -> None:

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from sqlalchemy.exc import SQLAlchemyError
+
 from common.errors import ConflictError, DeviceError, InterlockError, InternalError, RigwrightError
 from common.files.plain import plain
 from common.progress import Progress, ProgressCallback
@@ -23,6 +25,7 @@ from service.jobs.cancels import Cancels
 from service.jobs.engine import Running
 from service.jobs.manager import end_without_result
 from service.jobs.notifier import Notifier
+from service.jobs.writing import write_at_last
 from service.kinds.base import JobKind, Request, Result
 from service.kinds.rigs import RIG_TEST
 from service.stations.sessions import Sessions
@@ -41,7 +44,7 @@ class StationWork:
 _REOPEN_S = 5.0
 """How often devices are looked for that were not there: somebody plugs them in sooner or later."""
 
-_GONE = (TriggerState.DISCONNECTED, TriggerState.OPENING, TriggerState.PROBING)
+GONE = (TriggerState.DISCONNECTED, TriggerState.OPENING, TriggerState.PROBING)
 
 
 @dataclass(frozen=True)
@@ -69,7 +72,7 @@ class StationWorker:
         self._rig: Rig | None = None
         self._problem: RigwrightError | None = None
         self._doing: JobRecord | None = None
-        self._stopping = False
+        self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._serve, name=f"rig-{station.name}", daemon=True)
 
     @property
@@ -84,7 +87,7 @@ class StationWorker:
     def stop(self) -> None:
         """End what is being done and let go of the devices."""
         with self._lock:
-            self._stopping = True
+            self._stopping.set()
         self._context.cancels.stop_all()
         self._waiting.put(None)
         if self._thread.is_alive():
@@ -143,12 +146,12 @@ class StationWorker:
                 f"rig {self.name!r} is busy with {self._doing.kind} {self._doing.id}",
                 "wait until it has ended, or abort it",
             )
-        if self._rig is None or self._stopping:
+        if self._rig is None or self._stopping.is_set():
             raise self._not_open()
         box = self._rig.health().box
         if box is None or kind is RIG_TEST:
             return
-        if box.state in _GONE:
+        if box.state in GONE:
             raise DeviceError(
                 "trigger-gone",
                 f"the trigger box of rig {self.name!r} does not answer "
@@ -180,7 +183,7 @@ class StationWorker:
             order = self._next_job()
             if order is not None:
                 self._do(*order)
-            elif self._stopping:
+            elif self._stopping.is_set():
                 break
             elif self._rig is None:
                 self._try_to_open()
@@ -214,14 +217,13 @@ class StationWorker:
                 raise self._not_open()
             with self._context.cancels.running(job.id) as cancel:
                 running = Running(self._reporter(job.id), cancel)
-                result = work.do(self._rig, self._sessions, running)
-            jobs.complete(job.id, work.kind.result_row(result), {})
+                row = work.kind.result_row(work.do(self._rig, self._sessions, running))
+            self._write(lambda: jobs.complete(job.id, row, {}))
         except RigwrightError as error:
-            end_without_result(self._context.store, job.id, error)
+            self._end(job, error)
         except Exception as error:  # noqa: BLE001 - the rig must go on being usable
             logs.log.exception("a job of a rig could not be done")
-            fault = InternalError("rig-fault", f"a fault ({error!r})", "see the log")
-            end_without_result(self._context.store, job.id, fault)
+            self._end(job, InternalError("rig-fault", f"a fault ({error!r})", "see the log"))
         finally:
             with self._lock:
                 # The next may have been taken on since this one's end could be read.
@@ -230,9 +232,19 @@ class StationWorker:
             self._context.notifier.notify(job.id)
             logs.job_id.reset(token)
 
+    def _end(self, job: JobRecord, error: RigwrightError) -> None:
+        self._write(lambda: end_without_result(self._context.store, job.id, error))
+
+    def _write(self, write: Callable[[], None]) -> None:
+        # Where it cannot be written before the service ends, the next start settles the job.
+        with suppress(SQLAlchemyError):
+            write_at_last(write, self._stopping)
+
     def _reporter(self, job_id: str) -> ProgressCallback:
         def report(progress: Progress, /) -> None:
-            self._context.store.jobs.record_progress(job_id, plain(progress))
+            # How far a job is may go unwritten; what comes of it may not.
+            with suppress(SQLAlchemyError):
+                self._context.store.jobs.record_progress(job_id, plain(progress))
             self._context.notifier.notify(job_id)
 
         return report

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from sqlalchemy import Connection, Engine, create_engine, event
+from sqlalchemy.exc import OperationalError
 
 from common.errors import InternalError
 
@@ -65,6 +66,7 @@ class Database:
         self._writing = _engine(path, begin="BEGIN IMMEDIATE", query_only=False)
         self._reading = _engine(path, begin="BEGIN", query_only=True)
         self._closed = threading.Event()
+        self._refused = ""
         self._thread = threading.Thread(target=self._write_loop, name="store-writer", daemon=True)
         self._thread.start()
 
@@ -87,6 +89,11 @@ class Database:
         self._writes.put(item)
         return item.outcome.result()  # type: ignore[no-any-return]
 
+    @property
+    def refused(self) -> str:
+        """Why the last change could not be written; empty when it could."""
+        return self._refused
+
     def close(self) -> None:
         """Finish the changes that were asked for and let go of the file."""
         self._closed.set()
@@ -100,8 +107,12 @@ class Database:
             try:
                 with self._writing.connect() as connection, connection.begin():
                     outcome = item.change(connection)
+                self._refused = ""
                 if item.after is not None:
                     item.after()
+            except OperationalError as error:
+                self._refused = str(error.orig)
+                item.outcome.set_exception(error)
             except BaseException as error:  # noqa: BLE001 - handed to the caller, who waits for it
                 item.outcome.set_exception(error)
             else:

@@ -8,14 +8,13 @@ from pathlib import Path
 
 import pytest
 import trimesh
-from starlette.testclient import TestClient
 
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE))
 
 import counting_job  # noqa: E402 - found by the line above, like the next two
 import live_server  # noqa: E402
-from service_helpers import ROOT, LiveServer, StartServer  # noqa: E402
+from service_helpers import ROOT, LiveServer, StartServer, TestClient  # noqa: E402
 
 from service.api.context import Service  # noqa: E402
 from service.jobs.process import ProcessEngine  # noqa: E402

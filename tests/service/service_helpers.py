@@ -14,6 +14,8 @@ from typing import TypeVar
 
 import httpx2
 import pytest
+from fastapi import FastAPI
+from starlette.testclient import TestClient as StarletteClient
 from typer.testing import CliRunner
 
 from common.progress import CancelToken, ProgressCallback
@@ -29,12 +31,27 @@ from service.tasks.registry import work_of
 T = TypeVar("T")
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
+MARKED = {"X-Rigwright": "1"}
 RIGWRIGHT = [sys.executable, "-W", "error", "-m", "service.cli"]
 
 
 def rigwright(*arguments: object, **more: object) -> subprocess.CompletedProcess[str]:
     command = [*RIGWRIGHT, *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, check=False, **more)  # type: ignore[call-overload,no-any-return]
+
+
+class TestClient(StarletteClient):
+    """A client of this machine, whose requests say that no web page sends them."""
+
+    __test__ = False
+
+    def __init__(self, app: FastAPI, *, raise_server_exceptions: bool = True) -> None:
+        super().__init__(
+            app,
+            base_url="http://localhost",
+            headers=MARKED,
+            raise_server_exceptions=raise_server_exceptions,
+        )
 
 
 def wait_for(condition: Callable[[], T | None], seconds: float = 30.0) -> T:
@@ -123,7 +140,7 @@ class LiveServer:
     log: Path
 
     def client(self) -> httpx2.Client:
-        return httpx2.Client(base_url=self.url, timeout=30.0)
+        return httpx2.Client(base_url=self.url, timeout=30.0, headers=MARKED)
 
     def kill(self) -> None:
         self.process.kill()

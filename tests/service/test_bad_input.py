@@ -10,8 +10,7 @@ from pathlib import Path
 import pytest
 import trimesh
 from scanfiles import plain_head
-from service_helpers import files_under, one_line_and_nothing_left
-from starlette.testclient import TestClient
+from service_helpers import TestClient, files_under, one_line_and_nothing_left
 
 from rig.specification.examples import example_text
 from service.api.context import Service

@@ -18,12 +18,12 @@ import pytest
 from held_targets import FACING, PLATE, PLATE_TOML, Pictures, held, rig, shown, write_pictures
 from service_helpers import (
     InThisProcess,
+    TestClient,
     files_under,
     one_line_and_nothing_left,
     rigwright,
     wait_for,
 )
-from starlette.testclient import TestClient
 
 from common.errors import ConflictError
 from rig.acquisition.session.folder import Session, SessionPlan

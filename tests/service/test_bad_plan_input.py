@@ -17,12 +17,12 @@ from scanfiles import plain_head
 from scipy.spatial.transform import Rotation
 from service_helpers import (
     InThisProcess,
+    TestClient,
     files_under,
     one_line_and_nothing_left,
     rigwright_here,
     wait_for,
 )
-from starlette.testclient import TestClient
 
 from geometry.camera import RigCamera
 from geometry.frames import Pose

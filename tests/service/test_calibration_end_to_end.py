@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from calibration_rigs import FACE_WIDTH_MM, TARGETS, four_cameras, write_plate_station
-from service_helpers import wait_for
-from starlette.testclient import TestClient
+from service_helpers import TestClient, wait_for
 
 from service.api.app import create_app
 from service.api.context import Service

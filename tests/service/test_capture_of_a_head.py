@@ -11,8 +11,7 @@ import pytest
 from PIL import Image
 from rigs import compact_camera, names
 from scanfiles import real_head_path
-from service_helpers import wait_for
-from starlette.testclient import TestClient
+from service_helpers import TestClient, wait_for
 from trigger_boxes import any_box
 
 from geometry.camera import RigCamera

@@ -21,11 +21,11 @@ from service_helpers import (
     RIGWRIGHT,
     LiveServer,
     StartServer,
+    TestClient,
     files_under,
     small_rig_text,
     wait_for,
 )
-from starlette.testclient import TestClient
 
 from common.files.ownership import files_of
 from geometry.head import synthetic_head

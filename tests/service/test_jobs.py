@@ -5,16 +5,18 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import counting_job
 import pytest
 from counting_job import BRIEFLY, COUNT, MISBEHAVE, CountRequest, Misbehaved, MisbehaveRequest
 from service_helpers import HERE, ROOT, alive, ended, files_under, wait_for
+from sqlalchemy.exc import OperationalError
 
 from common.errors import CancelledError, ConflictError, InputError, InternalError, TooLargeError
 from common.progress import NeverCancelled, Progress, ignore_progress
+from service.jobs import writing
 from service.jobs.cancels import Cancels
 from service.jobs.engine import Task
 from service.jobs.manager import JobManager
@@ -235,3 +237,43 @@ class TestJobManager:
         again.start()
         assert ended(store, waiting).status is JobStatus.COMPLETED
         again.stop()
+
+
+class TestFullDisk:
+    @pytest.fixture(autouse=True)
+    def _impatient(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(writing, "RETRY_S", 0.02)
+
+    @staticmethod
+    def refusing(write: Callable[..., None], times: int) -> Callable[..., None]:
+        left = [times]
+
+        def full(*arguments: object) -> None:
+            if left[0]:
+                left[0] -= 1
+                raise OperationalError("INSERT", {}, Exception("database or disk is full"))
+            write(*arguments)
+
+        return full
+
+    def test_a_result_is_kept_once_there_is_room(
+        self, store: Store, manager: JobManager, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(store.jobs, "complete", self.refusing(store.jobs.complete, 3))
+        job = ended(store, ask(store, manager, "count", to=3))
+        assert job.status is JobStatus.COMPLETED
+        assert [file.name for file in store.jobs.files(job.id)] == ["numbers.txt"]
+
+    def test_a_failure_is_told_once_there_is_room(
+        self, store: Store, manager: JobManager, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(store.jobs, "end", self.refusing(store.jobs.end, 3))
+        job = ended(store, ask(store, manager, "misbehave", how="refuse"))
+        assert (job.problem or {})["problem"] == "seven is not a number of cameras"
+
+    def test_progress_that_cannot_be_written_loses_nothing(
+        self, store: Store, manager: JobManager, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        record = store.jobs.record_progress
+        monkeypatch.setattr(store.jobs, "record_progress", self.refusing(record, 10**6))
+        assert ended(store, ask(store, manager, "count", to=5)).status is JobStatus.COMPLETED

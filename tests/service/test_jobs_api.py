@@ -9,8 +9,7 @@ from typing import Any
 
 import httpx2
 import pytest
-from service_helpers import StartServer, files_under, wait_for
-from starlette.testclient import TestClient
+from service_helpers import StartServer, TestClient, files_under, wait_for
 
 TERMINAL = {"completed", "failed", "cancelled", "interrupted"}
 

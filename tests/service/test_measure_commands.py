@@ -14,8 +14,14 @@ from typing import Any
 import numpy as np
 import pytest
 from held_targets import FACING, PLATE, PLATE_TOML, held, rig, shifted, shown, write_pictures
-from service_helpers import InThisProcess, files_under, rigwright, rigwright_here, wait_for
-from starlette.testclient import TestClient
+from service_helpers import (
+    InThisProcess,
+    TestClient,
+    files_under,
+    rigwright,
+    rigwright_here,
+    wait_for,
+)
 
 from calibration.targets.files import targets_text
 from calibration.targets.kinds import RingCarrier, TargetPlace, TargetPlan

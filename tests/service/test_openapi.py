@@ -31,6 +31,7 @@ def fuzz(url: str, folder: Path, *options: str) -> None:
     (folder / "schemathesis.toml").write_text(CONFIG)
     command = [
         *(sys.executable, "-m", "schemathesis.cli", "run", f"{url}/openapi.json"),
+        *("-H", "X-Rigwright: 1"),
         *("--exclude-path-regex", NOT_FUZZED, "--seed", "1", "--workers", "2", *options),
     ]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)

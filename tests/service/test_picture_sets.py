@@ -9,8 +9,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from service_helpers import files_under
-from starlette.testclient import TestClient
+from service_helpers import TestClient, files_under
 
 from common.errors import InputError, RigwrightError, TooLargeError
 from service.api.context import Service

@@ -12,8 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from service_helpers import files_under, rigwright, small_rig_text, wait_for
-from starlette.testclient import TestClient
+from service_helpers import TestClient, files_under, rigwright, small_rig_text, wait_for
 
 from geometry.head import synthetic_head
 from rig.build.mounts.planfile import plan_from_mapping, read_plan

@@ -6,8 +6,7 @@ import logging
 import re
 
 import pytest
-from service_helpers import ROOT
-from starlette.testclient import TestClient
+from service_helpers import ROOT, TestClient
 
 from common import errors
 from common.files.plain import plain

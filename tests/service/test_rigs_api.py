@@ -13,8 +13,7 @@ from typing import Any
 
 import pytest
 from PIL import Image
-from service_helpers import wait_for
-from starlette.testclient import TestClient
+from service_helpers import TestClient, wait_for
 from stations import write_station
 
 from rig.acquisition.station.stationfile import read_station

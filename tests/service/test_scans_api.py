@@ -9,8 +9,7 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 import pytest
-from service_helpers import StartServer, files_under, wait_for
-from starlette.testclient import TestClient
+from service_helpers import StartServer, TestClient, files_under, wait_for
 
 from service.api.app import create_app
 from service.api.context import Service
@@ -209,7 +208,7 @@ class TestOnARealServer:
         server = start_server()
         with self.connect(server.url) as connection:
             head = (
-                "POST /v1/scans?filename=a.ply HTTP/1.1\r\nHost: x\r\n"
+                "POST /v1/scans?filename=a.ply HTTP/1.1\r\nHost: localhost\r\nX-Rigwright: 1\r\n"
                 f"Content-Length: {2 << 30}\r\nExpect: 100-continue\r\n\r\n"
             )
             connection.sendall(head.encode())
@@ -229,7 +228,8 @@ class TestOnARealServer:
         for end in ("close", "reset"):
             with self.connect(server.url) as connection:
                 connection.sendall(
-                    b"POST /v1/scans?filename=a.ply HTTP/1.1\r\nHost: x\r\nIdempotency-Key: k\r\n"
+                    b"POST /v1/scans?filename=a.ply HTTP/1.1\r\nHost: localhost\r\n"
+                    b"X-Rigwright: 1\r\nIdempotency-Key: k\r\n"
                     b"Content-Length: 9000000\r\n\r\n" + b"x" * 3_000_000
                 )
                 wait_for(lambda: files_under(staging))

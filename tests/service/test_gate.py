@@ -1,0 +1,129 @@
+"""What foreign web pages, wrong types, large and slow bodies meet."""
+
+from __future__ import annotations
+
+import socket
+import time
+
+import pytest
+from service_helpers import MARKED, LiveServer, StartServer, TestClient
+
+from service.api.limits import LARGEST_BODY_BYTES
+
+
+@pytest.mark.parametrize(
+    "host", ["rebound.example", "rebound.example:8000", "", "127.0.0.1.example"]
+)
+def test_a_foreign_name_is_not_answered(client: TestClient, host: str) -> None:
+    answer = client.get("/v1", headers={"Host": host})
+    assert (answer.status_code, answer.json()["type"]) == (421, "/problems/input/host")
+
+
+@pytest.mark.parametrize("host", ["localhost", "127.0.0.1:8000", "[::1]:8000", "192.168.1.7"])
+def test_addresses_and_this_machine_are(client: TestClient, host: str) -> None:
+    assert client.get("/v1", headers={"Host": host}).status_code == 200
+
+
+@pytest.mark.parametrize("origin", ["http://evil.example", "null", "http://localhost:3000"])
+@pytest.mark.parametrize("path", ["/v1/rigs/studio/abort", "/v1/designs/one/cancel", "/v1/designs"])
+def test_pages_of_other_origins_change_nothing(client: TestClient, path: str, origin: str) -> None:
+    answer = client.post(path, json={}, headers={"Origin": origin})
+    assert (answer.status_code, answer.json()["type"]) == (403, "/problems/input/origin")
+
+
+def test_its_own_pages_may(client: TestClient) -> None:
+    answer = client.post("/v1/designs/one/cancel", headers={"Origin": "http://localhost"})
+    assert answer.status_code == 404
+
+
+@pytest.mark.parametrize(
+    "path", ["/v1/rigs/studio/abort", "/v1/rigs/studio/reset", "/v1/designs/one/cancel"]
+)
+def test_what_a_browser_sends_without_asking_is_refused(client: TestClient, path: str) -> None:
+    del client.headers["X-Rigwright"]
+    answer = client.post(path)
+    assert (answer.status_code, answer.json()["type"]) == (403, "/problems/input/unmarked")
+    assert client.post(path, headers=MARKED).status_code == 404
+
+
+@pytest.mark.parametrize(
+    "given", ["text/plain", "application/x-www-form-urlencoded", "multipart/form-data; boundary=x"]
+)
+@pytest.mark.parametrize(
+    ("path", "right"),
+    [
+        ("/v1/designs", "application/json"),
+        ("/v1/scans?filename=head.ply", "application/octet-stream"),
+        ("/v1/picture-sets?filename=p.zip", "application/octet-stream"),
+    ],
+)
+def test_a_wrong_type_is_told_the_right_one(
+    client: TestClient, path: str, right: str, given: str
+) -> None:
+    answer = client.post(path, content=b"{}", headers={"Content-Type": given})
+    assert answer.status_code == 415
+    assert right in answer.json()["remedy"]
+
+
+def test_every_answer_is_protected(client: TestClient) -> None:
+    for path in ("/v1", "/v1/nothing"):
+        headers = client.get(path).headers
+        assert headers["Cross-Origin-Resource-Policy"] == "same-origin"
+        assert headers["X-Content-Type-Options"] == "nosniff"
+        assert "frame-ancestors 'self'" in headers["Content-Security-Policy"]
+    slash = client.get("/v1/designs/", follow_redirects=False)
+    assert (slash.status_code, slash.headers.get("Location")) == (404, None)
+
+
+@pytest.mark.parametrize("given", ["application/json", "application/problem+json"])
+def test_no_body_is_larger_than_allowed(client: TestClient, given: str) -> None:
+    piece = b" " * (1 << 20)
+
+    def body() -> object:
+        for _ in range((LARGEST_BODY_BYTES >> 20) + 1):
+            yield piece
+
+    for headers, content in (
+        ({"Content-Length": str(LARGEST_BODY_BYTES + 1)}, b"{}"),
+        ({}, body()),
+    ):
+        answer = client.post(
+            "/v1/designs", content=content, headers={"Content-Type": given} | headers
+        )
+        assert answer.status_code == 413
+
+
+HEAD = (
+    "POST /v1/designs HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: application/json\r\n"
+    "Content-Length: 1000\r\n\r\n"
+)
+
+
+def half_sent(server: LiveServer, text: str) -> socket.socket:
+    port = int(server.url.rpartition(":")[2])
+    opened = socket.create_connection(("127.0.0.1", port), timeout=20.0)
+    opened.sendall(text.encode())
+    return opened
+
+
+def test_the_service_stops_at_once_while_requests_are_half_sent(start_server: StartServer) -> None:
+    server = start_server()
+    slow = [half_sent(server, HEAD + "{") for _ in range(20)]
+    silent = [half_sent(server, "POST /v1/designs HTT") for _ in range(20)]
+    with server.client() as client:
+        assert client.get("/v1/health").status_code == 200
+    began_s = time.monotonic()
+    assert server.stop() == 0
+    # A quarter of a second until they hear of it, 2 s for their answers, 0.8 s for jobs.
+    assert time.monotonic() - began_s < 5.0
+    assert b"503" in slow[0].recv(4096).splitlines()[0]
+    assert "Traceback" not in server.log.read_text()
+    for one in (*slow, *silent):
+        one.close()
+
+
+def test_a_head_that_never_ends_is_let_go(start_server: StartServer) -> None:
+    server = start_server()
+    opened = half_sent(server, "GET /v1/health HTTP/1.1\r\nHost: ")
+    assert opened.recv(100) == b""  # before the socket's own 20 s
+    opened.close()
