@@ -101,6 +101,11 @@ class HeadKind:
         ]
         return float(min(inside))
 
+    @property
+    def room_deg(self) -> float:
+        """The margin that a head must keep: a step, less what angles lose on their way."""
+        return self.step_deg - 1e-9
+
     def links(self, base: Floats, camera: RigCamera) -> tuple[Link, ...]:
         """The chain from the frame before its base to the camera."""
         thread = camera.camera.body.mount_thread_camera_mm
@@ -170,7 +175,7 @@ def stances(
             if nearest is None or margin > nearest[0]:
                 nearest = (margin, stance)
         options.sort(key=lambda option: -option[0])
-        found += [stance for margin, stance in options if margin >= head.step_deg]
+        found += [stance for margin, stance in options if margin >= head.room_deg]
     if found or nearest is None:
         return found
     raise _out_of_reach(head, camera, nearest[1], _that_hold(head.others, camera, bases))
@@ -185,17 +190,18 @@ def _that_hold(
         for _, base in bases
         for pose in (camera.pose, turned_over(camera.pose))
     ]
-    return [h.part.id for h in heads if any(h.margin_deg(a) >= h.step_deg for a in asked)]
+    return [h.part.id for h in heads if any(h.margin_deg(a) >= h.room_deg for a in asked)]
 
 
 def _out_of_reach(
     head: HeadKind, camera: RigCamera, stance: Stance[FootT], others: list[str]
 ) -> InputError:
-    pan, tilt, roll = stance.angles_deg
+    # Rounded before 0 is added: a message must not say -0.0.
+    pan, tilt, roll = np.round(stance.angles_deg, 1) + 0.0
     reach = [
         # An angle that cannot be set has no room for a step at either end.
-        float(np.clip(a, min(low + head.step_deg, high), max(high - head.step_deg, low)))
-        for a, (low, high) in zip(stance.angles_deg, head.ranges_deg, strict=True)
+        float(np.clip(a, min(low + head.step_deg, high), max(high - head.step_deg, low))) + 0.0
+        for a, (low, high) in zip((pan, tilt, roll), head.ranges_deg, strict=True)
     ]
     return InputError(
         "head-range",
