@@ -11,5 +11,6 @@ HIDDEN_LIMIT_MM = 0.1
 LENGTH_LIMIT = (20.0, 50.0, 50.0)
 """Largest error of a length L, A + K L and at most B: micrometres, micrometres per metre."""
 
-VOLUME_MM = (300.0, 300.0, 200.0)
-"""Width, height and depth that are measured in."""
+VOLUME_MM = (200.0, 200.0, 100.0)
+"""Width, height and depth that are measured in: those of a face from ear to ear. Two thirds of its
+diagonal, the longest length that a test needs, are 200 mm."""

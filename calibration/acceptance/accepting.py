@@ -8,6 +8,7 @@ artefact and environment are the user's.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,13 +26,16 @@ from calibration.adjustment.camera import PER_CAMERA
 from calibration.adjustment.finite import finite_rows
 from calibration.adjustment.forward import Points, intersected
 from calibration.adjustment.result import Calibration
-from calibration.observations import Observations
+from calibration.observations import Carrier, Observations
 from common.errors import CancelledError, InputError
 from common.progress import CancelToken, NeverCancelled, Progress, ProgressCallback, ignore_progress
 from geometry.arrays import Floats, Ints
 
 ARTEFACT_SHARE = 0.2
 """An artefact less certain than this share of the limit decides nothing."""
+
+OFF_LINE_SHARE = 0.02
+"""A carrier whose targets lie farther off their line, as a share of its length, is no bar."""
 
 DIAGONAL_SHARE = 2.0 / 3.0
 SAME_LINE_DEG = 10.0
@@ -75,7 +79,8 @@ def accept(
     if cancel.is_set():
         raise CancelledError
     progress(Progress("lengths", 0.7))
-    lines = _lines(observations, points)
+    bars = bars_among(observations.targets.carriers)
+    lines = _lines(observations, bars, points)
     lengths = [
         m for line in lines for m in _lengths(line, observations, points, calibration, limit)
     ]
@@ -112,16 +117,40 @@ def _camera_index(calibration: Calibration, observations: Observations) -> Ints:
     return index
 
 
-def _lines(observations: Observations, points: Points) -> tuple[_Line, ...]:
-    """Each placed carrier with known coordinates, targets in order along it."""
+def bars_among(carriers: Sequence[Carrier]) -> tuple[Carrier, ...]:
+    """The carriers whose known targets lie on one line; :class:`InputError` where none does."""
+    bars = tuple(carrier for carrier in carriers if _on_a_line(carrier))
+    if not bars:
+        names = ", ".join(repr(carrier.name) for carrier in carriers)
+        raise InputError(
+            "acceptance-no-bar",
+            f"the target set has no bar: the targets of {names} do not lie on one line at known "
+            "places",
+            "give the target file of a calibrated bar with six targets on one line",
+        )
+    return bars
+
+
+def _on_a_line(carrier: Carrier) -> bool:
+    places = carrier.nominal_mm[finite_rows(carrier.sigma_mm)]
+    if len(places) < 2:
+        return False
+    along, off = np.linalg.svd(places - places.mean(axis=0), compute_uv=False)[:2]
+    return bool(off <= OFF_LINE_SHARE * along)
+
+
+def _lines(
+    observations: Observations, bars: tuple[Carrier, ...], points: Points
+) -> tuple[_Line, ...]:
+    """Each bar wherever it was seen, targets in order along it."""
     out, first = [], 0
     count = len(observations.targets.ids)
     for carrier in observations.targets.carriers:
         own = np.arange(first, first + len(carrier.ids))
         first += len(carrier.ids)
-        known = finite_rows(carrier.sigma_mm)
-        if known.sum() < 2:
+        if carrier not in bars:
             continue
+        known = finite_rows(carrier.sigma_mm)
         way = np.linalg.svd(carrier.nominal_mm[known] - carrier.nominal_mm[known].mean(axis=0))[2][
             0
         ]

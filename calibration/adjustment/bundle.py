@@ -19,7 +19,11 @@ from calibration.adjustment.network import Network
 from calibration.adjustment.noise import NoiseModel
 from calibration.adjustment.options import CalibrationOptions
 from calibration.adjustment.outliers import late_points, settle
-from calibration.adjustment.plausibility import lengths_must_agree, must_be_plausible
+from calibration.adjustment.plausibility import (
+    lengths_must_agree,
+    must_be_plausible,
+    shown_too_little,
+)
 from calibration.adjustment.quality import (
     Judged,
     camera_table,
@@ -29,6 +33,7 @@ from calibration.adjustment.quality import (
 )
 from calibration.adjustment.reduction import SingularError
 from calibration.adjustment.reliability import Reliability, reliability
+from calibration.adjustment.repeats import repeats_are_told
 from calibration.adjustment.result import (
     Calibration,
     CalibrationQuality,
@@ -76,6 +81,16 @@ def calibrate(
     options = options or CalibrationOptions()
     inspect(observations)
     progress(Progress("start", 0.0))
+    with repeats_are_told(observations):
+        return _calibrated(observations, options, progress, cancel)
+
+
+def _calibrated(
+    observations: Observations,
+    options: CalibrationOptions,
+    progress: ProgressCallback,
+    cancel: CancelToken | None,
+) -> Calibration:
     start = find_start(observations, options)
     if len(start.rows) == 0:
         raise InputError(
@@ -239,5 +254,5 @@ def _quality(
         correlations(judged),
         cross,
         done.start.scale,
-        warnings(judged, table, cross, done.late),
+        shown_too_little(observations, cameras, table) + warnings(judged, table, cross, done.late),
     )

@@ -5,12 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from calibration.adjustment.build import Start, camera_poses
+from calibration.adjustment.camera import CalibratedCamera
 from calibration.adjustment.covariance import Covariance
 from calibration.adjustment.datum import reach_mm
 from calibration.adjustment.initialisation.frame import centre_of
 from calibration.adjustment.levenberg import Solution
 from calibration.adjustment.network import Network
 from calibration.adjustment.options import CalibrationOptions
+from calibration.adjustment.repeats import alike_words, places_shown
+from calibration.adjustment.result import CameraQuality, doubtful_lenses
 from calibration.observations import Observations
 from common.errors import InputError
 
@@ -35,6 +38,32 @@ def must_be_plausible(
     _fits(observations, network, solution)
     _sizes(network, solution, options, observations)
     _determined(observations, network, solution, covariance)
+
+
+def shown_too_little(
+    observations: Observations,
+    cameras: tuple[CalibratedCamera, ...],
+    table: tuple[CameraQuality, ...],
+) -> tuple[str, ...]:
+    """Sentences on lenses that the pictures leave open, and on captures that say nothing new."""
+    out = []
+    names = doubtful_lenses(cameras, table)
+    if names:
+        focal = {c.name: c.interior.focal_length_px for c in cameras}
+        worst = max((row for row in table if row.name in names), key=lambda r: r.focal_sigma_px)
+        out.append(
+            f"Do not use it: the pictures leave open the focal length of {', '.join(names)} "
+            f"({worst.name}: {focal[worst.name]:.0f} px with a sigma of "
+            f"{worst.focal_sigma_px:.0f} px). Show the plate in ten places or more, tilted to 30 "
+            "degrees, nearer and farther."
+        )
+    places = places_shown(observations)
+    if places.few:
+        out.append(
+            f"{alike_words(places, observations)}: hold them elsewhere for each capture, "
+            "tilted, nearer and farther."
+        )
+    return tuple(out)
 
 
 def _fits(observations: Observations, network: Network, solution: Solution) -> None:

@@ -177,14 +177,6 @@ def decode(data: bytes) -> AnyImage | None:
     return None if image is None else np.asarray(image)
 
 
-def encode_png(image: AnyImage) -> bytes:
-    """A picture as PNG."""
-    done, data = cv2.imencode(".png", image)
-    if not done:
-        raise InputError("image-encode", "the picture cannot be written as PNG", "give 8 or 16 bit")
-    return bytes(data)
-
-
 def sampled(grey: Bytes, places_px: Floats) -> Floats:
     """Grey levels (n, m) at places (n, m, 2) between pixels; outside the picture its border's."""
     x, y = (np.ascontiguousarray(places_px[..., k], dtype=np.float32) for k in range(2))

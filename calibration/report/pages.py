@@ -171,8 +171,10 @@ def calibration_page(record: CalibrationRecord) -> str:
     """A calibration: how good it is, camera by camera, and what to know of it."""
     calibration, name, made_utc = record.calibration, record.name, record.made_utc
     quality = calibration.quality
-    colour = Light.GREEN if quality.converged and not quality.warnings else Light.YELLOW
+    colour = Light.YELLOW if quality.warnings else Light.GREEN
     told = "Calibrated" if quality.converged else f"Not converged ({quality.stop.value})"
+    if not quality.converged or calibration.doubtful_lenses:
+        colour = Light.RED
     cross = quality.cross_validation
     facts = [
         ("image points, rms", f"{quality.rms_px:.3f} px"),

@@ -6,11 +6,12 @@ picture is coded with the sRGB curve, as the studio reads pictures.
 
 from __future__ import annotations
 
+import io
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from calibration.detection import opencv
 from calibration.targets.kinds import CarrierKind, CharucoPlate, MarkerCarrier
 from calibration.targets.patterns import Pattern, marker_pattern, plate_pattern, ring_pattern
 from common.errors import InputError
@@ -21,6 +22,9 @@ MOST_PIXELS = 20_000_000
 """An A3 sheet. Half a gigabyte while it is drawn."""
 
 WHITE, BLACK = 0.86, 0.04
+WIDTH_KEY = "rigwright-width-mm"
+"""Text of a face's PNG: the width of the whole picture, white border included."""
+
 FLAT_MM = 1e-6
 
 
@@ -55,8 +59,22 @@ def carrier_face(kind: CarrierKind, px_per_mm: float = PX_PER_MM) -> Face:
     for pattern, place in patterns:
         _paint(white, pattern, place - low, box)
     light = BLACK + (WHITE - BLACK) * np.clip(white, 0.0, 1.0)
-    png = opencv.encode_png(np.round(255.0 * _srgb(light)).astype(np.uint8))
-    return Face(png, width * box, height * box)
+    return Face(
+        _png(np.round(255.0 * _srgb(light)).astype(np.uint8), box), width * box, height * box
+    )
+
+
+def _png(grey: NDArray[np.uint8], box_mm: float) -> bytes:
+    """A PNG that says how wide it is meant to be: who places it need not guess."""
+    # Imported late: only pictures of targets need it.
+    from PIL import Image, PngImagePlugin
+
+    told = PngImagePlugin.PngInfo()
+    told.add_text(WIDTH_KEY, f"{grey.shape[1] * box_mm:.4f}")
+    file = io.BytesIO()
+    dots_per_inch = 25.4 / box_mm
+    Image.fromarray(grey).save(file, "PNG", pnginfo=told, dpi=(dots_per_inch, dots_per_inch))
+    return file.getvalue()
 
 
 def has_face(kind: CarrierKind) -> bool:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 
 from common.errors import InputError
 from geometry.arrays import Floats
@@ -25,6 +27,10 @@ _PX_PER_CELL = 8
 _HALVED = 64
 """A picture's sides are made multiples of this, to be halved six times."""
 
+_WIDTH_KEY = "rigwright-width-mm"
+"""Text of a PNG that ``rigwright targets`` writes: how wide the whole picture is."""
+
+_WIDTH_SHARE = 0.005
 _BORDER_SHARE = 0.125
 _BOARD_PX_PER_MM = 12.0
 _BACK_ALBEDO = 0.4
@@ -84,6 +90,7 @@ def target(settings: TargetSettings) -> Flat:
         picture = read_picture(settings.image) if settings.image else None
         if picture is None:
             raise InputError("simulation-target-image", "a target has no image", "give its file")
+        _must_be_as_wide_as_told(settings)
         return _pictured(settings, LINEAR_OF_SRGB[_without_colour(picture)])
     face, px_per_mm = _coded(settings)
     border = round(_BORDER_SHARE * settings.size_mm * px_per_mm)
@@ -92,6 +99,25 @@ def target(settings: TargetSettings) -> Flat:
     albedo = np.float32(0.04) + np.float32(0.82) * (face.astype(np.float32) / 255.0)
     size = (face.shape[1] / px_per_mm, face.shape[0] / px_per_mm)
     return placed(settings.place, size, albedo, blocky=True)
+
+
+def _must_be_as_wide_as_told(settings: TargetSettings) -> None:
+    """Raises :class:`InputError` where a picture of targets says another width than its settings.
+
+    A plate shown a twentieth too large would calibrate well, and to a size that is wrong.
+    """
+    with Image.open(settings.image or Path()) as picture:
+        told = picture.info.get(_WIDTH_KEY)
+    if told is None:
+        return
+    width_mm = float(told)
+    if abs(settings.size_mm - width_mm) > _WIDTH_SHARE * width_mm:
+        raise InputError(
+            "simulation-target-size",
+            f"the picture {settings.image} is {width_mm:g} mm wide with its border, not "
+            f"{settings.size_mm:g} mm",
+            f"give size_mm = {width_mm:g}",
+        )
 
 
 def _pictured(settings: TargetSettings, face: Singles) -> Flat:

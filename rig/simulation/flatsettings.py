@@ -65,6 +65,9 @@ class HeldSettings:
 class TargetSettings:
     """A flat target. ``size_mm`` is the side of a marker, of a ChArUco square, a picture's width.
 
+    A picture's width is that of all of it, white border included. Pictures that ``rigwright
+    targets`` writes say theirs, and another one is refused.
+
     ``kind`` ``aruco`` takes ``dictionary`` (an OpenCV name, AprilTags too) and ``marker_id``,
     ``charuco`` ``dictionary`` and ``squares`` (across, down), ``image`` the file ``image``.
     Coded targets have a white border of an eighth of ``size_mm``. The back is plain grey. A

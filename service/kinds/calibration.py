@@ -89,6 +89,10 @@ class CalibrationResult(Result):
     scale: Annotated[str, Field(description="Where the size comes from.")]
     datum: str
     warnings: list[str]
+    doubtful_lenses: Annotated[
+        list[str],
+        Field(description="Cameras whose focal length is too uncertain: do not use the result."),
+    ] = Field(default_factory=list)
     cameras: list[CameraCalibration]
 
 

@@ -32,6 +32,7 @@ def calibration_result(calibration: Calibration, detection: Detection) -> Calibr
         scale=quality.scale,
         datum=calibration.datum,
         warnings=list(quality.warnings),
+        doubtful_lenses=list(calibration.doubtful_lenses),
         cameras=[_camera(camera, own) for camera, own in cameras],
     )
 

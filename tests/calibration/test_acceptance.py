@@ -110,6 +110,38 @@ def test_an_uncertain_bar_is_told() -> None:
     assert any("own uncertainty" in note for note in found.notes)
 
 
+def test_a_plate_is_no_bar() -> None:
+    scene = bar_scene()
+    bar = scene.targets.carriers[0]
+    corners = np.array([[x, y, 0.0] for y in (0.0, 40.0) for x in (0.0, 50.0, 100.0)])
+    plate = Carrier("plate", bar.ids, corners, np.full((6, 3), 1e-3))
+    unknown = Carrier("stand", ("s1", "s2", "s3"), np.zeros((3, 3)), np.full((3, 3), np.inf))
+    seen = scene.observe(0.1, 9)
+    for carriers in ((plate,), (plate, unknown)):
+        with pytest.raises(InputError) as caught:
+            accept(
+                calibrations.small_reference(),
+                replace(seen, targets=TargetSet("plates", carriers)),
+                GENEROUS,
+            )
+        assert caught.value.detail == "acceptance-no-bar"
+        assert "'plate'" in caught.value.problem and "\n" not in str(caught.value)
+
+
+def test_only_the_bar_of_a_target_set_is_measured() -> None:
+    scene = bar_scene()
+    bar = scene.targets.carriers[0]
+    square = np.array([[0.0, 0.0, 0.0], [30.0, 0.0, 0.0], [0.0, 30.0, 0.0]])
+    plate = Carrier("plate", ("p1", "p2", "p3"), square, np.full((3, 3), 1e-3))
+    seen = replace(scene.observe(0.1, 3), targets=TargetSet("both", (bar, plate)))
+    found = accept(calibrations.small_reference(), seen, GENEROUS)
+    assert {m.line.split(" in ")[0] for m in found.lengths} == {"bar"}
+
+
+def test_the_longest_length_that_the_default_volume_needs_fits_a_bar_of_20_cm() -> None:
+    assert 2.0 / 3.0 * Volume().diagonal_mm == pytest.approx(200.0)
+
+
 def test_bad_input_is_one_line() -> None:
     for values in ((-1.0, 0.0, 1.0), (0.0, 0.0, 1.0), (1.0, 1.0, 0.0), (float("nan"), 1.0, 1.0)):
         with pytest.raises(InputError, match="limit"):

@@ -12,6 +12,7 @@ from synthetic_scenes import Scene, face_rig, plate, plate_places, stand
 
 from calibration.adjustment import CalibrationOptions, InteriorModel, ReferencePoses, calibrate
 from calibration.adjustment.initialisation.resection import RigidTransform
+from calibration.adjustment.options import FREE
 from calibration.observations import Carrier, Distance, Observations, TargetSet
 from common.errors import InputError
 from geometry.frames import Pose
@@ -75,7 +76,7 @@ def a_crop() -> Observations:
     return replace(GOOD, image_size_px=GOOD.image_size_px // 2)
 
 
-def frontal_plates() -> Observations:
+def frontal_plates(step_mm: float = 9.0) -> Scene:
     """A plate that is never tilted, always at one distance, before two parallel cameras."""
     carrier, points = plate(sigma_mm=0.0)
     cameras = tuple(
@@ -84,9 +85,10 @@ def frontal_plates() -> Observations:
     )
     turn = cameras[0].pose.rotation_rig_to_camera.T
     places = tuple(
-        RigidTransform(turn, dx * turn[:, 0] - 2.0 * dx * turn[:, 1]) for dx in (-9.0, 0.0, 9.0)
+        RigidTransform(turn, dx * turn[:, 0] - 2.0 * dx * turn[:, 1])
+        for dx in (-step_mm, 0.0, step_mm)
     )
-    return Scene(cameras, TargetSet("p", (carrier,)), points, (places,)).observe(0.1, 2)
+    return Scene(cameras, TargetSet("p", (carrier,)), points, (places,))
 
 
 def nothing_in_common() -> Observations:
@@ -133,12 +135,20 @@ def test_coordinates_in_metres_are_noticed_beside_a_start() -> None:
 
 def test_plates_never_tilted_do_not_determine_a_focal_length() -> None:
     with pytest.raises(InputError) as caught:
-        calibrate(frontal_plates())
+        calibrate(frontal_plates().observe(0.1, 2))
     assert caught.value.detail in (
         "calibration-degenerate",
         "calibration-interior",
         "calibration-undetermined",
     )
+
+
+def test_where_alike_captures_are_the_reason_they_are_named() -> None:
+    scene = frontal_plates(0.0)
+    start = CalibrationOptions(start=scene.cameras, model=InteriorModel(f=FREE))
+    with pytest.raises(InputError) as caught:
+        calibrate(scene.observe(0.1, 2), start)
+    assert "3 captures show the targets in 1 place only" in caught.value.problem
 
 
 def test_a_start_with_other_names_is_refused() -> None:

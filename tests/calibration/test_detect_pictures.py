@@ -13,7 +13,6 @@ import pytest
 import target_scenes as scenes
 from PIL import Image
 
-from calibration.detection import opencv
 from calibration.detection.gates import Gates
 from calibration.detection.images import decoded, picture_from, read_picture
 from calibration.detection.pictures import DetectionJob, TakenPicture, detect_pictures
@@ -37,7 +36,7 @@ def files(image: np.ndarray, tmp_path_factory: pytest.TempPathFactory) -> list[T
     for camera in ("left", "right"):
         for frame in ("1", "2"):
             path = folder / f"{camera}-{frame}.png"
-            path.write_bytes(opencv.encode_png(image))
+            Image.fromarray(image).save(path)
             out.append(TakenPicture(camera, frame, path))
     return out
 

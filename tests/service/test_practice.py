@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from calibration.acceptance import Volume
 from calibration.acceptance.accepting import DIAGONAL_SHARE
 from calibration.targets.files import read_targets
 from calibration.targets.kinds import RingCarrier
+from common.errors import InputError
 from rig.acquisition.cameras.base import ArmSpec
 from rig.acquisition.station.stationfile import read_station
 from rig.devices.simulated import simulation_settings
@@ -19,8 +21,6 @@ from rig.simulation.flats import held_up, target
 from rig.simulation.flatsettings import HeldSettings, PlaceSettings, TargetSettings
 from service.cli import app
 from service.practice import STATIONS, write_practice
-
-README_VOLUME = Volume(200.0, 200.0, 100.0)
 
 
 @pytest.fixture(scope="module")
@@ -48,11 +48,23 @@ def test_pictures_are_as_large_as_the_targets_say(folder: Path) -> None:
     assert all(target(settings).size_mm[0] >= settings.size_mm for settings in targets)
 
 
-def test_the_bar_is_long_enough_for_the_volume_of_the_readme(folder: Path) -> None:
+@pytest.mark.parametrize("share", [0.05, -0.0526])
+def test_a_wrong_guess_at_the_size_of_a_picture_is_told(folder: Path, share: float) -> None:
+    plate, *_ = simulation_settings(read_station(folder / "station.toml")).scene.targets
+    target(plate)
+    with pytest.raises(InputError) as caught:
+        target(replace(plate, size_mm=plate.size_mm * (1.0 + share)))
+    assert "mm wide with its border, not" in caught.value.problem
+    # The remedy is the size that is right, to the 0.05 mm that a name in a file may be rounded to.
+    told = float(caught.value.remedy.removeprefix("give size_mm = "))
+    assert told == pytest.approx(plate.size_mm, abs=0.05)
+
+
+def test_the_bar_is_long_enough_for_the_default_volume(folder: Path) -> None:
     (bar,) = read_targets(folder / "bar.toml").carriers
     assert isinstance(bar, RingCarrier)
     places = np.array([place.position_mm for place in bar.places])
-    needed = max(DIAGONAL_SHARE * README_VOLUME.diagonal_mm, README_VOLUME.shortest_mm)
+    needed = max(DIAGONAL_SHARE * Volume().diagonal_mm, Volume().shortest_mm)
     assert np.ptp(places[:, 0]) >= needed
     assert len(places) >= 6  # five lengths from its first target
 

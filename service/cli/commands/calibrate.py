@@ -55,7 +55,8 @@ def calibrate(
 ) -> None:
     """Calibrate all cameras of a rig from pictures of targets.
 
-    Exit code: 0 done, 2 bad input, 4 not converged (do not use it), 130 interrupted.
+    Exit code: 0 done, 2 bad input, 4 do not use it (not converged, or the pictures leave a focal
+    length open), 130 interrupted.
 
     Example:  rigwright calibrate pictures --targets targets/targets.toml --out calibration
     """
@@ -91,5 +92,5 @@ def calibrate(
         else:
             measurement_tables.print_calibration(result)
             print_files(files_of(out))
-    if not result.converged:
+    if not result.converged or result.doubtful_lenses:
         raise typer.Exit(NOT_WELL)

@@ -136,14 +136,16 @@ def print_acceptance(result: AcceptanceResult) -> None:
     """An acceptance test: the outcome, and each length."""
     _print_detection(result.detection)
     _say(result.text, *(f"missing: {text}" for text in result.missing))
+    lines = {name: k for k, name in enumerate(dict.fromkeys(r.line for r in result.lengths), 1)}
+    _say(*(f"line {k}: {name}" for name, k in lines.items()))
     table = Table(
-        *("Line", "Length", "Calibrated mm", "Error um", "Limit um", ""),
+        *("Line", "Length", "mm", "Error um", "Limit um", ""),
         title="Lengths",
         title_justify="left",
     )
     for row in result.lengths:
         table.add_row(
-            escape(row.line),
+            str(lines[row.line]),
             escape(f"{row.first} - {row.second}"),
             _number(row.calibrated_mm, 4),
             f"{row.error_um:+.1f}",
