@@ -26,7 +26,7 @@ class ConstraintRow:
     ``name`` is ``family/subject``, for example ``frame/cam03`` or ``base_height_min/cam01-cam02``.
     ``slack`` is in ``unit`` and negative when the limit is broken; for an equality it is the
     tolerance less the deviation. ``active``: the limit binds, i.e. its slack is below
-    ``1e-3`` of its scale.
+    ``1e-3`` of its scale; an equality with a tolerance does so only near an end of it.
     """
 
     name: str

@@ -46,8 +46,7 @@ def row(
         Sense.EQUAL: tolerance - abs(value - limit),
     }[sense]
     size = max(abs(scale), 1e-12)
-    # An equality binds by its nature.
-    active = sense is Sense.EQUAL or slack < BINDING * size
+    active = slack < BINDING * size
     met = slack >= -SATISFIED * size
     return ConstraintRow(
         name, float(value), float(limit), sense, unit, float(slack), bool(active), bool(met)

@@ -65,10 +65,19 @@ def print_limits(constraints: Iterable[ConstraintFigures]) -> None:
             escape(row.name),
             _number(row.value, row.unit),
             row.sense,
-            _number(row.limit),
+            _asked(row),
             state,
         )
     Console().print(table)
+
+
+def _asked(row: ConstraintFigures) -> str:
+    """The limit; that of an equality with its tolerance, which slack and deviation add up to."""
+    words = _number(row.limit)
+    if row.sense != "==" or row.value is None or row.limit is None or row.slack is None:
+        return words
+    tolerance = row.slack + abs(row.value - row.limit)
+    return f"{words} \u00b1 {_number(tolerance)}" if tolerance > 1e-9 else words
 
 
 def _rank(row: ConstraintFigures) -> tuple[bool, bool, float]:

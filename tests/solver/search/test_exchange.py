@@ -1,0 +1,146 @@
+"""From a subject to networks of named cameras: what is returned, and what a shake does."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from functools import cache, partial
+
+import numpy as np
+import pytest
+import rigs
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from common.errors import CancelledError
+from common.progress import NeverCancelled
+from geometry.camera import RigCamera
+from solver.limits import BaseHeight, Coverage, HalfSpace, Limits, Zones
+from solver.quality import evaluate
+from solver.search import exchange as module
+from solver.search.candidates import Candidates, candidates
+from solver.search.exchange import Found, exchange, search_networks
+from solver.search.networks import Search
+
+NEVER = NeverCancelled()
+LIMITS = rigs.face_limits(coverage=Coverage(), base_height=BaseHeight(min=0.15, neighbour_max=0.5))
+
+
+@pytest.fixture(scope="module", autouse=True)
+def coarser_candidates() -> Iterator[None]:
+    """Fewer candidates than the search's own, for speed."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, "candidates", partial(candidates, step_deg=14.0))
+        yield
+
+
+@cache
+def networks(seed: int = 0) -> list[tuple[RigCamera, ...]]:
+    return search_networks(
+        rigs.face(30, 60), rigs.compact_camera(), LIMITS, rigs.names(3), (), seed, NEVER
+    )
+
+
+def pool(seed: int, count: int = 25) -> Candidates:
+    """Candidates with made-up information: places on a sphere, half of the points seen by each."""
+    rng = np.random.default_rng(seed)
+    place = rng.normal(size=(count, 3))
+    place *= 900.0 / np.linalg.norm(place, axis=1, keepdims=True)
+    seen = rng.random((count, 8)) < 0.5
+    arm = rng.normal(size=(count, 3, 3, 8))
+    matrix = np.einsum("mikp,mjkp->mijp", arm, arm) * seen[:, None, None]
+    entries = np.stack(
+        [matrix[:, i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))], axis=1
+    )
+    camera = rigs.face_cameras(rigs.face(20, 30), 1)[0]
+    return Candidates(
+        (camera,) * count, entries, seen, 0.1, place, np.linalg.norm(place, axis=1), 2
+    )
+
+
+def test_networks_are_complete_named_in_order_and_different() -> None:
+    found = networks()
+    assert 1 <= len(found) <= 4
+    for network in found:
+        assert tuple(c.name for c in network) == rigs.names(3)
+    places = {tuple(c.pose.position_rig_mm.tobytes() for c in n) for n in found}
+    assert len(places) == len(found)
+
+
+def test_the_best_network_comes_first_and_breaks_no_rule_about_pairs() -> None:
+    costs = []
+    for network in networks():
+        quality = evaluate(rigs.face(30, 60), network, LIMITS)
+        assert not [r for r in quality.violated if r.family.startswith("base_height")]
+        assert not [r for r in quality.violated if r.family == "body_clearance"]
+        costs.append(quality.cost_mm2)
+    # 60 check points are all weighed, so search and evaluation agree on the order.
+    assert costs == sorted(costs)
+
+
+def test_the_same_seed_gives_the_same_networks() -> None:
+    again = search_networks(
+        rigs.face(30, 60), rigs.compact_camera(), LIMITS, rigs.names(3), (), 0, NEVER
+    )
+    for one, other in zip(networks(), again, strict=True):
+        for a, b in zip(one, other, strict=True):
+            assert a.pose.position_rig_mm.tobytes() == b.pose.position_rig_mm.tobytes()
+            assert a.focus_distance_mm == b.focus_distance_mm
+
+
+def test_where_nobody_may_stand_there_is_no_network() -> None:
+    far = Zones(allowed=(HalfSpace(np.array([0.0, 1.0, 0.0]), 5000.0),))
+    limits = rigs.face_limits(zones=far)
+    args = (rigs.face(30, 60), rigs.compact_camera(), limits, rigs.names(2), (), 0, NEVER)
+    assert search_networks(*args) == []
+
+
+def test_rules_that_no_network_can_keep_give_none() -> None:
+    # All candidates stand about as far away, so no base is three times the height.
+    limits = rigs.face_limits(base_height=BaseHeight(min=3.0))
+    args = (rigs.face(30, 60), rigs.compact_camera(), limits, rigs.names(2), (), 0, NEVER)
+    assert search_networks(*args) == []
+
+
+def test_a_cancelled_search_says_so_before_it_looks() -> None:
+    cancel = threading.Event()
+    cancel.set()
+    with pytest.raises(CancelledError):
+        search_networks(
+            rigs.face(30, 60), rigs.compact_camera(), LIMITS, rigs.names(2), (), 0, cancel
+        )
+
+
+def test_a_search_that_is_told_to_stop_returns_what_it_has() -> None:
+    cancel = threading.Event()
+    cancel.set()
+    search = Search(pool(1), Limits(body_clearance_mm=None))
+    (found,) = exchange(search, search, 3, 0, cancel)
+    assert len(found.network) == 5
+
+
+@settings(max_examples=8, deadline=None, derandomize=True)
+@given(st.integers(0, 1000), st.integers(1, 5))
+def test_a_shake_moves_at_most_three_free_cameras_and_keeps_the_rest(seed: int, count: int) -> None:
+    search = Search(pool(seed), Limits(body_clearance_mm=None))
+    network = search.grown(search.fixed, count)
+    shaken = module._shaken(search, network, np.random.default_rng(seed))
+    assert len(shaken) == len(network)
+    assert set(search.fixed.tolist()) <= set(shaken.tolist())
+    assert len(set(network.tolist()) - set(shaken.tolist())) <= min(3, count)
+    assert (shaken < len(search.candidates)).all()
+    # The rule forbids a place taken twice, and there is always a free one among the best dozen.
+    assert search.score(shaken)[0] == 0
+
+
+@settings(max_examples=4, deadline=None, derandomize=True)
+@given(st.integers(0, 1000))
+def test_shaking_never_ends_worse_than_exchanging_alone(seed: int) -> None:
+    search = Search(pool(seed), Limits(body_clearance_mm=None))
+    alone = search.score(search.exchanged(search.grown(search.fixed, 3)))
+    found = exchange(search, search, 3, seed, NEVER, shakes=4)
+    # Sums in another order differ in the last digits.
+    assert found[0].score <= (alone[0], alone[1] * (1.0 + 1e-12))
+    assert all(isinstance(f, Found) for f in found)
+    for each in found:
+        assert each.score == search.score(each.network)

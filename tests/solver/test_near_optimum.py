@@ -1,0 +1,197 @@
+"""Short moves from a good network: what counts as better, how far they go, what they never lose."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import replace
+from functools import cache
+from itertools import pairwise
+
+import numpy as np
+import pytest
+import rigs
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from common.progress import NeverCancelled
+from solver import near_optimum
+from solver.coverage.views import NEAR, judge
+from solver.formulation import Merit, unknown_bounds
+from solver.limits import BaseHeight, Coverage, CoverageTier, PoseBounds
+from solver.near_optimum import FIRST_BOX, LARGEST_BOX, MAX_MOVES, run_near
+from solver.outer_loop import StartResult
+from solver.problem import Problem
+from solver.quality import evaluate
+from solver.variables import FOCUS, PER_CAMERA
+
+NEVER = NeverCancelled()
+SCALE = 2.0
+
+
+def problem_of(count: int = 3, **changes: object) -> Problem:
+    subject = rigs.face(40, 90)
+    limits = rigs.face_limits(
+        **{"coverage": Coverage((CoverageTier(2, 0.85),)), "base_height": BaseHeight(min=0.1)}
+        | changes
+    )
+    return Problem(subject, rigs.face_cameras(subject, count, limits), limits)
+
+
+@cache
+def solved() -> tuple[Problem, StartResult, tuple[tuple[float, ...], ...]]:
+    problem, told = problem_of(), []
+    result = run_near(problem, lambda *step: told.append(step), NEVER)
+    return problem, result, tuple(told)
+
+
+# --- what is better ---------------------------------------------------------------------------
+
+sizes = st.floats(0.0, 10.0)
+merits = st.builds(Merit, st.one_of(st.just(0.0), sizes), st.one_of(st.just(0.0), sizes), sizes)
+
+
+@settings(max_examples=150, deadline=None, derandomize=True)
+@given(merits, merits, merits)
+def test_better_is_an_order(one: Merit, two: Merit, three: Merit) -> None:
+    better = near_optimum._better
+    assert not better(one, one, SCALE)
+    assert not (better(one, two, SCALE) and better(two, one, SCALE))
+    if better(one, two, SCALE) and better(two, three, SCALE):
+        assert better(one, three, SCALE)
+
+
+@settings(max_examples=80, deadline=None, derandomize=True)
+@given(sizes, st.floats(1e-6, 1.0), st.floats(1e-6, 1.0))
+def test_what_is_broken_costs_more_than_it_could_gain(
+    cost: float, violation: float, shortfall: float
+) -> None:
+    whole = Merit(0.0, 0.0, cost)
+    # A twentieth of the scale, and 300 or 3000 of it per unit of what is broken.
+    for broken, charge in (
+        (Merit(violation, 0.0, 0.0), 0.05 + 300.0 * violation),
+        (Merit(0.0, shortfall, 0.0), 0.05 + 3000.0 * shortfall),
+    ):
+        dearer = replace(broken, cost=cost)
+        assert near_optimum._better(whole, dearer, SCALE)
+        assert not near_optimum._better(dearer, whole, SCALE)
+        gains = replace(broken, cost=cost - SCALE * charge * 1.01)
+        assert near_optimum._better(gains, whole, SCALE)
+
+
+def test_rounding_breaks_nothing() -> None:
+    assert near_optimum._better(Merit(0.9e-7, 0.0, 1.0), Merit(0.0, 0.0, 1.001), SCALE)
+    assert not near_optimum._better(Merit(1.1e-7, 0.0, 1.0), Merit(0.0, 0.0, 1.001), SCALE)
+
+
+# --- the box ----------------------------------------------------------------------------------
+
+
+def test_a_move_stays_in_its_box_and_in_the_bounds_and_the_focus_is_free() -> None:
+    problem = problem_of(2, bounds=PoseBounds(x_mm=10.0))
+    values = problem.start_values()
+    bounds = unknown_bounds(problem, values)
+    low, high = (b.reshape(2, PER_CAMERA) for b in near_optimum._box(values, 0.05, bounds))
+    at = values.reshape(2, PER_CAMERA)
+    np.testing.assert_allclose(high[:, 3] - at[:, 3], 10.0 / problem.length_mm)
+    for column in (0, 1, 2, 4, 5):
+        np.testing.assert_allclose(high[:, column] - at[:, column], 0.05)
+        np.testing.assert_allclose(at[:, column] - low[:, column], 0.05)
+    assert np.isinf(high[:, FOCUS]).all()
+    np.testing.assert_allclose(low[:, FOCUS] * problem.length_mm, 350.0)
+
+
+# --- a network looked at ----------------------------------------------------------------------
+
+
+def test_a_network_is_looked_at_with_the_check_points() -> None:
+    problem = problem_of()
+    values = problem.start_values()
+    found = near_optimum._looked_at(problem, values, unknown_bounds(problem, values))
+    quality = evaluate(problem.subject, problem.cameras, problem.limits)
+    assert found.merit.cost * problem.length_mm**2 == pytest.approx(quality.cost_mm2, rel=1e-9)
+    judged = judge(problem, problem.unknowns.state(values))
+    assert found.merit.shortfall == judged.shortfall
+    views = quality.points.views
+    np.testing.assert_array_equal(found.weak, np.flatnonzero((views > 0) & (views <= 2)))
+
+
+def test_of_many_weak_points_some_stand_for_the_rest() -> None:
+    subject = rigs.face(20, 900)
+    limits = rigs.face_limits(coverage=Coverage())
+    problem = Problem(subject, rigs.face_cameras(subject, 2), limits)
+    _, weak = near_optimum._checked(problem, problem.start_values())
+    quality = evaluate(subject, problem.cameras, limits)
+    assert (quality.points.views[weak] > 0).all()
+    assert 100 < len(weak) <= 2 * near_optimum._MOST_WEAK
+    # Evenly through their order, not the first ones only.
+    assert weak.max() > 800
+
+
+# --- the moves --------------------------------------------------------------------------------
+
+
+def test_moves_end_feasible_and_better_by_the_evaluations_own_figures() -> None:
+    problem, result, _ = solved()
+    before = evaluate(problem.subject, problem.cameras, problem.limits)
+    after = evaluate(problem.subject, problem.placed(result.values), problem.limits)
+    assert after.feasible, after.violated
+    assert not before.feasible or after.cost_mm2 < before.cost_mm2
+    assert result.merit.feasible
+    assert result.merit.cost * problem.length_mm**2 == pytest.approx(after.cost_mm2, rel=1e-6)
+    assert result.reach is NEAR
+    assert not result.stopped
+    assert result.why
+    assert 1 <= result.rounds <= MAX_MOVES
+
+
+def test_a_second_run_from_the_end_is_never_worse_and_keeps_what_it_had() -> None:
+    problem, result, _ = solved()
+    again = Problem(problem.subject, problem.placed(result.values), problem.limits)
+    first = evaluate(problem.subject, again.cameras, problem.limits)
+    more = run_near(again, lambda *_: None, NEVER)
+    second = evaluate(problem.subject, again.placed(more.values), problem.limits)
+    assert second.feasible
+    assert second.cost_mm2 <= first.cost_mm2 * (1.0 + 1e-9)
+    # Whoever begins near the end has little to gain: one move of the first box at the most.
+    assert second.cost_mm2 > 0.9 * first.cost_mm2
+
+
+def test_progress_counts_moves_and_steps_up() -> None:
+    _, result, told = solved()
+    moves, steps = [t[0] for t in told], [t[1] for t in told]
+    assert moves == sorted(moves)
+    assert steps == sorted(steps)
+    assert (moves[0], moves[-1]) == (1, result.rounds)
+    assert steps[-1] == result.iterations
+
+
+def test_a_cancelled_run_returns_its_start_and_says_so() -> None:
+    problem, cancel = problem_of(2), threading.Event()
+    cancel.set()
+    result = run_near(problem, lambda *_: None, cancel)
+    assert result.stopped
+    assert result.why == "stopped by request"
+    np.testing.assert_array_equal(result.values, problem.start_values())
+
+
+def test_no_move_reaches_beyond_its_box(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem, moves = problem_of(2, coverage=Coverage()), []
+    whole = near_optimum._moved
+
+    def watched(problem, best, held, half, bounds, scale, monitor):  # noqa: ANN001, ANN202
+        outcome, lost = whole(problem, best, held, half, bounds, scale, monitor)
+        moved = np.abs(outcome.values - best.values).reshape(-1, PER_CAMERA)[:, :FOCUS]
+        moves.append((half, float(moved.max())))
+        return outcome, lost
+
+    monkeypatch.setattr(near_optimum, "_moved", watched)
+    run_near(problem, lambda *_: None, NEVER)
+    assert moves[0][0] == FIRST_BOX
+    for half, size in moves:
+        assert size <= half + 1e-9
+        assert half <= LARGEST_BOX
+    # A good move widens the next box by half; a bad one leaves two fifths of it.
+    for (before, _), (after, _) in pairwise(moves):
+        assert after == pytest.approx(min(1.5 * before, LARGEST_BOX)) or after == pytest.approx(
+            0.4 * before
+        )
