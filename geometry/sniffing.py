@@ -50,9 +50,9 @@ def check_file(path: Path) -> str:
     or declares too much, :class:`InputError` when the content is not what the name says.
     """
     if not path.is_file():
-        raise NotFoundError(
-            "scan-file", f"there is no file {path.name!r}", "check the path of the scan"
-        )
+        folder = path.is_dir()
+        what = f"{path.name!r} is a folder" if folder else f"there is no file {path.name!r}"
+        raise NotFoundError("scan-file", what, "check the path of the scan")
     kind = KINDS.get(path.suffix.lower())
     if kind is None:
         known = ", ".join(sorted(set(KINDS.values())))

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
 from calibration.adjustment.result import Calibration
-from common.page.html import text_table
+from common.page.html import esc, text_table
 from common.page.svg import FAINT, GREEN, INK, dot, drawing, line, words
 from geometry.arrays import Floats
 
@@ -15,6 +16,8 @@ _WIDTH, _MARGIN = 480.0, 40.0
 _SIGHT_SHARE = 0.2
 """How long a line of sight is drawn, of the width of what is shown."""
 
+_GREY = "#7b8794"
+_EYE = {"x": -0.9, "y": -1.45, "z": 0.6}
 VIEWS = (("from above", (0, 1)), ("from the front", (0, 2)))
 """Words, and the axes of the rig that point right and up in the picture."""
 
@@ -57,6 +60,41 @@ def target_places(calibration: Calibration) -> Floats:
     ]
     places = np.concatenate(shown) if shown else np.zeros((0, 3))
     return np.asarray(places[np.isfinite(places).all(axis=1)])
+
+
+def turning_figure(calibration: Calibration) -> dict[str, Any]:
+    """Cameras, their lines of sight and all places of targets for plotly, as plain data."""
+    targets = target_places(calibration)
+    eyes = np.array([c.pose.position_rig_mm for c in calibration.cameras])
+    ways = np.array([c.pose.rotation_rig_to_camera[2] for c in calibration.cameras])
+    reach = _SIGHT_SHARE * float(np.ptp(np.concatenate([eyes, targets]), axis=0).max())
+    gaps = np.full_like(eyes, np.nan)
+    sights = np.stack([eyes, eyes + reach * ways, gaps], axis=1).reshape(-1, 3)
+    names = [esc(c.name) for c in calibration.cameras]
+    cameras = {"mode": "markers+text", "text": names, "textposition": "top center"}
+    axis = {"showbackground": False, "zeroline": False, "nticks": 6}
+    scene: dict[str, Any] = {
+        f"{name}axis": {**axis, "title": {"text": f"{name.upper()} (mm)"}} for name in "xyz"
+    }
+    scene |= {"aspectmode": "data", "dragmode": "orbit", "camera": {"eye": _EYE}}
+    return {
+        "data": [
+            _points(targets, name="targets", mode="markers", marker={"size": 1.5, "color": _GREY}),
+            _points(sights, name="lines of sight", mode="lines", line={"color": INK, "width": 3}),
+            _points(eyes, name="cameras", marker={"size": 5, "color": GREEN}, **cameras),
+        ],
+        "layout": {
+            "scene": scene,
+            "margin": {"l": 0, "r": 0, "t": 0, "b": 0},
+            "legend": {"orientation": "h"},
+        },
+    }
+
+
+def _points(places: Floats, **more: object) -> dict[str, Any]:
+    """A trace through places (n, 3); None where a line is interrupted."""
+    columns = [[round(v, 2) if np.isfinite(v) else None for v in row] for row in places.T.tolist()]
+    return {"type": "scatter3d", **dict(zip("xyz", columns, strict=True)), **more}
 
 
 def network_figures(calibration: Calibration) -> str:

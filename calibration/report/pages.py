@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Sequence
+from importlib.resources import files
+
 from calibration.adjustment.result import Calibration
 from calibration.check.verdicts import CameraCheck, CheckResult, Kind, Light
 from calibration.files.calibrationfile import CalibrationRecord
 from calibration.files.records import CheckRecord
 from calibration.report.history import History, explained, history_svg
-from calibration.report.network import network_figures, values_table
+from calibration.report.network import network_figures, turning_figure, values_table
 from calibration.report.residualplot import residual_plot
-from common.page.document import still_page
+from calibration.report.views import DetectionView, views_figures
+from common.page.document import drawn_page, still_page
 from common.page.html import esc, text_table
 from common.page.svg import GREEN, RED, YELLOW, Series, chart
 
@@ -23,6 +28,7 @@ th:first-child,td:first-child{text-align:left}th{font-weight:600;vertical-align:
 .light{display:inline-block;width:1.6rem;height:1.6rem;border-radius:50%;vertical-align:middle}
 .finding{border-left:.35rem solid;padding:.4rem .8rem;margin:.6rem 0;background:#f6f8fa}
 .plots{display:flex;flex-wrap:wrap;gap:1rem}.plots figure{width:300px;margin:0}
+#network-3d{height:480px}
 figcaption,small,.note{color:#52606d;font-size:.85rem}svg{max-width:100%;height:auto}
 """
 COLOURS = {Light.GREEN: GREEN, Light.YELLOW: YELLOW, Light.RED: RED}
@@ -167,8 +173,11 @@ def _residuals(cameras: tuple[CameraCheck, ...], reference: Calibration) -> str:
     return f'<div class="plots">{"".join(plots)}</div>'
 
 
-def calibration_page(record: CalibrationRecord) -> str:
-    """A calibration: how good it is, camera by camera, and what to know of it."""
+def calibration_page(record: CalibrationRecord, views: Sequence[DetectionView] = ()) -> str:
+    """A calibration: how good it is, camera by camera, and what to know of it.
+
+    ``views``: pictures with what was detected, where there are some.
+    """
     calibration, name, made_utc = record.calibration, record.name, record.made_utc
     quality = calibration.quality
     colour = Light.YELLOW if quality.warnings else Light.GREEN
@@ -214,25 +223,31 @@ def calibration_page(record: CalibrationRecord) -> str:
         for c, k in zip(quality.cameras, calibration.cameras, strict=True)
         if c.grid
     )
-    return still_page(
+    return drawn_page(
         f"Calibration {name}".strip(),
-        "".join(
+        header=f"<h1>{light(colour)} {esc(told)} {esc(name)}</h1><p>{esc(made_utc)}</p>",
+        main="".join(
             [
-                f"<h1>{light(colour)} {esc(told)} {esc(name)}</h1><p>{esc(made_utc)}</p>",
-                *(finding(w, YELLOW) for w in quality.warnings),
+                *(finding(w, COLOURS[colour]) for w in quality.warnings),
                 text_table(("", ""), facts),
                 "<h2>Cameras</h2>",
                 text_table(head, rows),
                 "<h2>What was calibrated</h2>",
                 values_table(calibration),
+                '<div id="network-3d"></div>',
                 network_figures(calibration),
                 '<p class="note">Green: cameras and which way they look; grey: every place in '
-                "which a target was seen.</p>",
+                "which a target was seen. Drag the first figure to turn it.</p>",
+                *(["<h2>What was detected</h2>", views_figures(views)] if views else []),
                 "<h2>Residuals over the images</h2>",
                 f'<div class="plots">{plots}</div>',
             ]
         ),
-        STYLE,
+        footer="",
+        style=STYLE,
+        figures=json.dumps({"figure": turning_figure(calibration)}, allow_nan=False),
+        script=files("calibration.report").joinpath("network.js").read_text(encoding="utf-8"),
+        view={"cameras": len(calibration.cameras), "detections": len(views)},
     )
 
 

@@ -43,6 +43,11 @@ def element(tag: str, content: str, **attributes: str) -> str:
     return f"<{tag}{spelt}>{content}</{tag}>"
 
 
+def long_words(words: str) -> str:
+    """Words of a cell that may break over lines; others stay on one."""
+    return element("span", esc(words), class_="long")
+
+
 def table(
     head: Sequence[str],
     rows: Iterable[Sequence[str]],

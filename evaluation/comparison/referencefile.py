@@ -22,7 +22,8 @@ def read_reference(path: Path) -> Reference:
     import trimesh
 
     if not path.is_file():
-        raise NotFoundError("reference", f"there is no file {path}", "check the path")
+        what = f"{path} is a folder" if path.is_dir() else f"there is no file {path}"
+        raise NotFoundError("reference", what, "check the path")
     if path.suffix.lower() not in SUFFIXES or path.stat().st_size > LARGEST_BYTES:
         raise InputError(
             "reference-file",

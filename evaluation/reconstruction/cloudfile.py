@@ -51,7 +51,8 @@ def read_points(path: Path) -> Floats:
     :class:`InputError` in one line for what is no such file.
     """
     if not path.is_file():
-        raise NotFoundError("cloud", f"there is no file {path}", "check the path")
+        what = f"{path} is a folder" if path.is_dir() else f"there is no file {path}"
+        raise NotFoundError("cloud", what, "check the path")
     if path.stat().st_size > LARGEST_BYTES:
         raise InputError("cloud-too-large", f"{path.name} has more than 2 GB", "thin it out first")
     ply = plyfile()

@@ -31,7 +31,8 @@
     if (scene && place.clientWidth < 560) {
       for (const axis of "xyz") scene.camera.eye[axis] *= 1.35;
     }
-    await Plotly.newPlot(place, figure.data, { ...figure.layout, ...flat }, config);
+    // Over a map the toolbar would hide its colour scale.
+    await Plotly.newPlot(place, figure.data, { ...figure.layout, ...flat }, scene ? config : { ...config, displayModeBar: false });
     await recolour(place);
     return place;
   };

@@ -112,12 +112,11 @@ def _axes(cameras: tuple[RigCamera, ...], centre: Floats) -> Floats:
 def _names(cameras: tuple[RigCamera, ...]) -> go.Scatter3d:
     import plotly.graph_objects as go
 
-    # Behind the body, where the name hides nothing.
+    # Above the body however it is rolled, where the name hides nothing.
     at = np.array(
         [
-            c.pose.to_rig(
-                np.array([[0.0, 0.0, c.camera.body.front_z_mm - 1.6 * c.camera.body.size_mm[2]]])
-            )[0]
+            c.pose.to_rig(np.atleast_2d(c.camera.body.centre_camera_mm))[0]
+            + [0.0, 0.0, 0.5 * float(np.linalg.norm(c.camera.body.size_mm))]
             for c in cameras
         ]
     )
@@ -126,6 +125,7 @@ def _names(cameras: tuple[RigCamera, ...]) -> go.Scatter3d:
         y=at[:, 1],
         z=at[:, 2],
         mode="text",
+        textposition="top center",
         text=[esc(c.name) for c in cameras],
         name="names",
         hoverinfo="skip",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from common.page.html import element, esc, figure_text, percent, table
+from common.page.html import element, esc, figure_text, long_words, percent, table
 from geometry.arrays import Floats
 from rig.design.layout import Layout, Neighbour
 from rig.report.words import family_words
@@ -187,7 +187,7 @@ def starts_table(solver: SolverReport) -> str:
                 figure_text(start.violation, 2),
                 str(start.iterations),
                 str(start.rounds),
-                esc(start.why_stopped),
+                long_words(start.why_stopped),
             )
         )
         css.append("")

@@ -12,6 +12,7 @@ from service.cli.running import processes
 from service.kinds.base import RunContext
 
 TARGETS = "targets.toml"
+CALIBRATION = "calibration.json"
 
 
 @dataclass(frozen=True)
@@ -48,4 +49,12 @@ def picture_source(
 
 def reference_file(given: Path) -> Path:
     """The file of a calibration that is given as a file or as its folder."""
-    return given / "calibration.json" if given.is_dir() else given
+    if not given.is_dir():
+        return given
+    if not (given / CALIBRATION).is_file():
+        raise InputError(
+            "no-calibration",
+            f"the folder {given} holds no {CALIBRATION}",
+            "give a folder that rigwright calibrate wrote",
+        )
+    return given / CALIBRATION

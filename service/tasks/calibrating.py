@@ -23,7 +23,14 @@ from calibration.files import (
     read_calibration,
     write_calibration,
 )
-from calibration.report import calibration_page, check_page, history_of, history_page
+from calibration.report import (
+    DetectionView,
+    calibration_page,
+    check_page,
+    detection_views,
+    history_of,
+    history_page,
+)
 from calibration.targets.files import read_targets
 from common.progress import Progress, ProgressCallback
 from rig.design.designfile import read_design
@@ -42,12 +49,13 @@ def calibration(
 ) -> CalibrationResult:
     """Calibrate all cameras; writes ``calibration.json``, ``report.html``, ``detections.json``."""
     plan = read_targets(task.inputs["targets"])
-    seen = see(plan, task, running)
+    views: list[DetectionView] = []
+    seen = see(plan, task, running, lambda found: views.extend(detection_views(found)))
     options = _options(task.request, task.inputs)
     done = calibrate(seen.observations, options, _after(running.report), running.cancel)
     record = CalibrationRecord(task.request.name, task.run.made_utc, done)
     write_calibration(task.folder / "calibration.json", record)
-    _write(task.folder / "report.html", calibration_page(record))
+    _write(task.folder / "report.html", calibration_page(record, views))
     running.report(Progress("done", 1.0))
     return calibration_result(done, detection_of(seen))
 

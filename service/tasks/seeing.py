@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import tempfile
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager
 from multiprocessing import get_context
@@ -30,8 +30,16 @@ _WORTH_PROCESSES = 8
 """Fewer pictures are found in less time than processes take to start."""
 
 
-def see(plan: TargetPlan, task: Task[RequestT, ResultT], running: Running) -> DetectedPictures:
+def see(
+    plan: TargetPlan,
+    task: Task[RequestT, ResultT],
+    running: Running,
+    look: Callable[[DetectedPictures], None] | None = None,
+) -> DetectedPictures:
     """The targets of ``plan`` in the pictures that a task was given.
+
+    ``look`` is called while the pictures are still there: those of an archive are unpacked for
+    as long as this takes.
 
     Those are an archive (input ``pictures``), or the session or folder of pictures that its run
     names. Writes ``detections.json`` into the task's folder.
@@ -54,6 +62,8 @@ def see(plan: TargetPlan, task: Task[RequestT, ResultT], running: Running) -> De
                 cancel=running.cancel,
                 executor=executor,
             )
+        if look is not None:
+            look(seen)
     document = json.dumps(_document(seen), allow_nan=False) + "\n"
     (task.folder / "detections.json").write_text(document, encoding="utf-8")
     return seen

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import xml.etree.ElementTree as ET
 from dataclasses import replace
 from html.parser import HTMLParser
+from typing import Any
 
 import calibrations
 import numpy as np
@@ -13,9 +15,12 @@ import pytest
 from calibration.adjustment.result import Calibration
 from calibration.check import CheckOptions, CheckResult, check
 from calibration.check.verdicts import Kind
+from calibration.detection.detections import Detections
+from calibration.detection.pictures import DetectedPictures, TakenPicture
 from calibration.files import CalibrationRecord, CheckRecord
 from calibration.report import calibration_page, check_page, history_of, history_page, history_svg
 from calibration.report.network import network_figures, target_places
+from calibration.report.views import detection_views
 
 NASTY = '<script>alert("x")</script>'
 
@@ -51,6 +56,20 @@ def parsed(page: str) -> Balanced:
     return reader
 
 
+def without_scripts(page: str) -> str:
+    """A page with figures without its scripts: plotly, the figures, and what draws them."""
+    before, start, _ = page.partition("\n<script>")
+    assert start
+    return before + page[page.rindex("</script>") + len("</script>") :]
+
+
+def figure_of(page: str) -> dict[str, Any]:
+    """The figure that the page's script draws."""
+    start = page.index('id="figures">') + len('id="figures">')
+    found: dict[str, Any] = json.loads(page[start : page.index("</script>", start)])["figure"]
+    return found
+
+
 def moved_check(urad: float, seed: int) -> CheckResult:
     scene = calibrations.disturbed(
         calibrations.check_scene(), 2, turn_rad=np.array([urad * 1e-6, 0.0, 0.0])
@@ -73,7 +92,7 @@ def test_the_check_page_says_it_in_words_numbers_and_pictures() -> None:
 
 def test_the_calibration_page_has_all_cameras() -> None:
     page = calibration_page(CalibrationRecord(NASTY, "2026-11-22", calibrations.small_reference()))
-    reader = parsed(page)
+    reader = parsed(without_scripts(page))
     assert all(f"<td>cam{k}</td>" in page for k in range(1, 6))
     assert reader.seen.count("svg") == 5 + 2
     assert NASTY not in page
@@ -122,6 +141,50 @@ def test_the_calibration_page_has_the_values_and_where_all_stands() -> None:
     assert drawings.count("<svg") == 2
     # Each view has a dot for each camera and each place of a target.
     assert drawings.count("<circle") == 2 * (len(reference.cameras) + len(target_places(reference)))
+
+
+def test_the_figure_that_turns_has_every_camera_where_it_stands() -> None:
+    reference = calibrations.small_reference()
+    nasty = replace(reference.cameras[0], name=NASTY)
+    told = replace(reference, cameras=(nasty, *reference.cameras[1:]))
+    page = calibration_page(CalibrationRecord("small", "", told))
+    assert NASTY not in page
+    targets, _, cameras = figure_of(page)["data"]
+    assert len(targets["x"]) == len(target_places(reference))
+    stand = np.array([cameras[axis] for axis in "xyz"]).T
+    places = np.array([c.pose.position_rig_mm for c in reference.cameras])
+    # Written to a hundredth of a millimetre.
+    assert np.abs(stand - places).max() <= 0.005 + 1e-9
+
+
+def test_of_each_camera_the_picture_with_most_targets_is_shown_with_marks_on_them() -> None:
+    pictures = [
+        TakenPicture(camera, frame, np.full((300, 600), 90, np.uint8))
+        for camera, frame in (("a", "1"), ("a", "2"), ("b", "1"))
+    ]
+    detections = (found(1), found(3), found(2))
+    seen = DetectedPictures(calibrations.small_scene().observe(0.1, 1), tuple(pictures), detections)
+    one, other = detection_views(seen)
+    assert (one.camera, one.frame, other.camera) == ("a", "2", "b")
+    assert one.size_px == (480, 240)
+    # 600 pixels become 480: the middle of pixel 9 lies at 9.5 x 0.8.
+    assert np.allclose(one.marks_px[0], [9.5 * 0.8, 19.5 * 0.8])
+    page = calibration_page(
+        CalibrationRecord("small", "", calibrations.small_reference()), (one, other)
+    )
+    own = parsed(without_scripts(page))
+    assert own.seen.count("image") == 2
+    assert "a, 2: 3 targets" in page and "What was detected" in page
+
+
+def found(count: int) -> Detections:
+    return Detections(
+        (600, 300),
+        tuple(f"t{k}" for k in range(count)),
+        np.array([[9.0 + 10.0 * k, 19.0] for k in range(count)]),
+        np.full((count, 2), 0.05),
+        np.full(count, 0.8),
+    )
 
 
 def test_places_of_targets_are_those_that_the_cameras_saw() -> None:

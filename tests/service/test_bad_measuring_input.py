@@ -355,6 +355,9 @@ def test_references_that_are_none(folder: Path) -> None:
         assert "rigwright.calibration/1" in told
     assert "there is no file nothing" in line("--reference", "nothing", *targets)
     assert "give --targets" in line("--reference", "half.json")
+    assert "there is no file nothing" in line("--reference", "nothing")
+    (folder / "empty").mkdir()
+    assert "the folder empty holds no calibration.json" in line("--reference", "empty")
     (folder / "history").write_text("")
     reference = ("--reference", "calibration")
     assert "history is a file" in line(*reference, "--history", "history")

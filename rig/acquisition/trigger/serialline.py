@@ -26,6 +26,9 @@ LINE_ERRORS = (serial.SerialException, OSError, TypeError)
 """What pyserial raises when a port goes: its own error, plain OSError from ``in_waiting``, and
 TypeError where the handle was closed under it."""
 
+_HOST_AND_PORT = re.compile(r"(?!COM)[\w.-]+:\d+", re.IGNORECASE)
+"""A port of the network without the word ``socket://`` before it."""
+
 _SLICE_S = 0.005
 _WRITE_PATIENCE_S = 0.5
 
@@ -160,5 +163,7 @@ def _open_port(url: str, baud: int) -> serial.SerialBase:
         raise DeviceError(
             "trigger-gone",
             f"the port {bare_url(url)} cannot be opened ({error})",
-            "plug the box in and check the port's name and your right to use it",
+            f"for a port of the network give socket://{url}"
+            if _HOST_AND_PORT.fullmatch(url)
+            else "plug the box in and check the port's name and your right to use it",
         ) from error

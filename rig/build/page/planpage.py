@@ -8,7 +8,7 @@ from typing import Any
 
 from common.files.plain import number
 from common.page.document import drawn_page, style_sheet
-from common.page.html import element, esc, figure_text, percent, plot, section, table
+from common.page.html import element, esc, figure_text, long_words, percent, plot, section, table
 from geometry.raycast import Occluder
 from rig.build.drawings.figures import POSE_COLUMNS, mm, pose_figures, setting_text
 from rig.build.drawings.steps import plain_steps
@@ -20,6 +20,9 @@ from rig.build.parts.bill import Bill
 from rig.build.parts.cuts import Cut
 
 FIGURE = "plan-3d"
+LISTED_FROM = 3
+"""So many pieces of one step are shown one below the other."""
+
 CONTENTS = (
     ("structure", "Structure"),
     ("accuracy", "Accuracy"),
@@ -132,15 +135,22 @@ def _tiles(plan: MountPlan, bill: Bill) -> str:
         ),
         _tile(
             "Mass", f"{bill.mass_g / 1000.0:.1f} <small>kg</small>",
-            f"without {len(bill.without_mass)} parts of unknown mass" if bill.without_mass else "",
+            _without(bill.without_mass, "mass"),
         ),
         _tile(
             "Cost", cost,
-            f"without {len(bill.without_price)} parts that have no price"
-            if bill.without_price else "",
+            _without(bill.without_price, "price"),
         ),
     )  # fmt: skip
     return f'<div class="tiles">{"".join(tiles)}</div>'
+
+
+def _without(parts: tuple[str, ...], what: str) -> str:
+    """Which parts a sum leaves out; the first of a bill, cameras, weigh and cost most."""
+    if not parts:
+        return ""
+    more = f" and {len(parts) - 1} more" if len(parts) > 1 else ""
+    return f"no {what} is known of {parts[0]}{more}"
 
 
 def _structure() -> str:
@@ -165,7 +175,7 @@ def _accuracy(plan: MountPlan) -> str:
             figure_text(f.sigma_p95_mm),
             percent(f.coverage_2_views),
             percent(f.coverage_3_views),
-            "all hold" if f.feasible else esc(", ".join(f.broken) or "broken"),
+            "all hold" if f.feasible else long_words(", ".join(f.broken) or "broken"),
         )
         for name, f in stages
     ]
@@ -242,8 +252,18 @@ def _cuts(cuts: tuple[Cut, ...]) -> str:
     )
 
 
+def _step(step: str) -> str:
+    """A step; one of several pieces as a list of them."""
+    head, colon, rest = step.partition(": ")
+    pieces = rest.rstrip(".").split("; ")
+    if not colon or len(pieces) < LISTED_FROM:
+        return element("li", esc(step))
+    below = "".join(element("li", esc(piece)) for piece in pieces)
+    return f"<li>{esc(head)}:<ul>{below}</ul></li>"
+
+
 def _steps(plan: MountPlan) -> str:
-    steps = "".join(element("li", esc(step)) for step in plain_steps(plan))
+    steps = "".join(_step(step) for step in plain_steps(plan))
     notes = "".join(element("li", esc(note)) for note in plan.notes)
     clashes = "".join(
         f"<li>{esc(c.one)} and {esc(c.other)} ({esc(c.kind)}): {figure_text(c.clearance_mm)} mm, "

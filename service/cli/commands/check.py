@@ -93,8 +93,12 @@ def check(
 def _targets_beside(reference: Path) -> Path:
     from common.errors import InputError
     from service.cli.pictures import TARGETS, reference_file
+    from service.cli.running import require_files
 
-    beside = reference_file(reference).with_name(TARGETS)
+    calibration = reference_file(reference)
+    # Where the reference is missing, its targets are too: that would be told of the wrong thing.
+    require_files([calibration])
+    beside = calibration.with_name(TARGETS)
     if not beside.is_file():
         raise InputError(
             "no-targets", f"there is no {TARGETS} beside the calibration", "give --targets"

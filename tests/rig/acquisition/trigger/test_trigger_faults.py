@@ -71,6 +71,19 @@ def test_a_port_where_nothing_answers(monkeypatch: pytest.MonkeyPatch) -> None:
         quiet.unplug()
 
 
+@pytest.mark.parametrize("address", ["127.0.0.1:7411", "box.local:23"])
+def test_an_address_of_the_network_is_told_how_to_be_written(address: str) -> None:
+    with pytest.raises(DeviceError) as caught:
+        SerialLine(address, 115_200, -1)
+    assert caught.value.remedy == f"for a port of the network give socket://{address}"
+
+
+@pytest.mark.parametrize("address", ["/dev/none", "COM77"])
+def test_other_ports_are_looked_for_at_the_cable(address: str) -> None:
+    with pytest.raises(DeviceError, match="plug the box in"):
+        SerialLine(address, 115_200, -1)
+
+
 def test_a_peer_that_takes_nothing_blocks_nobody() -> None:
     quiet = PtyEndpoint()
     line = SerialLine(quiet.url, 115_200, -1)
