@@ -54,6 +54,9 @@ BREACHES = {
     "Handlers of requests meet no domain: kinds, tasks, stations and pictures do": Breach(
         "service.api", "rig.catalogue"
     ),
+    "The page is a guest: it meets the service over HTTP alone": Breach(
+        "service.page", "service.store"
+    ),
 }
 
 

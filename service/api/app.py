@@ -17,6 +17,7 @@ from service.api import (
     checks,
     designs,
     evaluations,
+    examples,
     exports,
     picturesets,
     plans,
@@ -33,6 +34,7 @@ from service.api.gate import Gate
 from service.api.limits import PAUSE_S, BodyLimits
 from service.api.middleware import RequestLog
 from service.api.models import Problem, problems
+from service.page.routes import router as page_router
 
 _DESCRIPTION = (
     "Designs and runs multi-camera rigs that photograph a face. Lengths are in millimetres, angles "
@@ -55,13 +57,14 @@ def make_app() -> FastAPI:
         redirect_slashes=False,
     )
     resources = (
-        *(root, scans, designs, exports, plans, evaluations),
+        *(root, scans, examples, designs, exports, plans, evaluations),
         *(rigs, captures, rigtests, sessions),
         *(targetsets, picturesets, calibrations, checks, acceptances),
     )
     app.state.routers = [module.router for module in resources]
     for router in app.state.routers:
         app.include_router(router)
+    app.include_router(page_router)
     install_error_handlers(app)
     app.openapi = lambda: _openapi(app)  # type: ignore[method-assign]
     return app

@@ -19,7 +19,7 @@ _LITTLE_DISK_BYTES = 1 << 30
 
 
 _RESOURCES = (
-    *("health", "scans", "designs", "plans", "evaluations"),
+    *("health", "scans", "rig-examples", "designs", "plans", "evaluations"),
     *("rigs", "captures", "rig-tests", "sessions"),
     *(
         "target-sets",

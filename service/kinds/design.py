@@ -9,7 +9,7 @@ from pydantic import Field
 
 from rig.specification.rigfile import RigFile
 from rig.specification.spec import RigSpec
-from service.kinds.base import LARGEST_JSON_INTEGER, Figure, JobKind, Request, Result
+from service.kinds.base import LARGEST_JSON_INTEGER, Figure, JobKind, Model, Request, Result
 from service.kinds.evaluation import EvaluationResult
 from service.kinds.scanned import rig_for_scan
 
@@ -61,6 +61,13 @@ class DesignResult(EvaluationResult):
     conflicts: list[Conflict]
     collisions: int
     seconds: float
+
+
+class RigExample(Model):
+    """A rig that comes with the program."""
+
+    name: str
+    rig: Annotated[RigFile, Field(description="What a design takes as `rig`.")]
 
 
 DESIGN = JobKind("design", DesignRequest, DesignResult)

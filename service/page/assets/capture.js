@@ -1,0 +1,108 @@
+// Taking a capture: names, countdown, fire, abort, and the pictures as soon as they are there.
+
+import { follow, get, pause, post } from "./api.js";
+import { field, fill, h, problem } from "./dom.js";
+import { watch } from "./job.js";
+import { sheet } from "./pictures.js";
+
+/** The form and the result for one rig. `know` is told how the rig is now. */
+export function capturing(rig, signal) {
+  const today = new Date().toLocaleDateString("sv");
+  const session = h("input", { value: today, pattern: "[A-Za-z0-9][A-Za-z0-9_.\\-]{0,63}", required: true, autocomplete: "off" });
+  const subject = h("input", { maxlength: 200, autocomplete: "off" });
+  const shots = h("input", { type: "number", min: 1, max: 1000, value: 1 });
+  const interval = h("input", { type: "number", min: 0, max: 1000000, value: 0 });
+  const countdown = h("input", { type: "number", min: 0, max: 60, value: 0 });
+  const fire = h("button", { type: "submit", class: "fire" }, "Fire");
+  const place = h("div", { class: "result", "aria-live": "polite" });
+  const others = h("p", { class: "note" });
+  let own = "";
+  let counting = null;
+
+  async function go(event) {
+    event.preventDefault();
+    if (counting) { counting.abort(); return; }
+    const id = captureId();
+    const asked = {
+      capture_id: id, session: session.value, subject: subject.value, shots: Number(shots.value),
+      interval_us: Number(interval.value) * 1000,
+    };
+    counting = new AbortController();
+    try {
+      if (!await counted(Number(countdown.value), fire, counting.signal, signal)) return;
+      fire.disabled = true;
+      own = `/v1/captures/${id}`;
+      const job = await post(rig.links.captures, asked);
+      await watch(place, job, (done) => outcome(done), signal);
+      if (!signal.aborted) await kept(place, own, signal);
+    } catch (error) {
+      if (!signal.aborted) fill(place, problem(error));
+    } finally {
+      counting = null;
+      fire.disabled = false;
+      fire.textContent = "Fire";
+    }
+  }
+
+  const element = h("form", { class: "capture", onsubmit: go },
+    h("div", { class: "fields" }, field("Session", session, "One folder of captures, for a subject or a day."),
+      field("Subject", subject, "For a new session."), field("Shots", shots), field("Between shots, ms", interval),
+      field("Countdown, s", countdown)),
+    fire, others, place);
+
+  return { element, know: (now) => {
+    const busy = now.status === "busy";
+    if (!counting) fire.disabled = busy || now.status === "closed";
+    const other = busy && now.doing && now.doing !== own;
+    others.textContent = other ? "The rig is at work for somebody else." : "";
+    if (other && now.doing.startsWith("/v1/captures/")) {
+      own = now.doing; // shown here as well: everybody at the rig sees the last capture
+      shown(place, now.doing, signal);
+    }
+  } };
+}
+
+function captureId() {
+  const now = new Date().toISOString().replace(/[-:]/g, "").replace("T", "-").slice(0, 15);
+  return `${now}-${Math.random().toString(36).slice(2, 6)}`;
+}
+
+/** Count down on the button; false when it was pressed again, or the view was left. */
+async function counted(seconds, button, stopped, left) {
+  for (let more = seconds; more > 0; more -= 1) {
+    button.textContent = `${more} – press to stop`;
+    await pause(1000);
+    if (stopped.aborted || left.aborted) return false;
+  }
+  button.textContent = "Firing";
+  return true;
+}
+
+async function shown(place, path, signal) {
+  try {
+    await follow(await get(path, signal), () => {}, signal);
+    const job = await get(path, signal);
+    fill(place, job.result ? outcome(job) : problem({ message: job.problem?.detail ?? job.status }));
+    if (!job.result) await kept(place, path, signal);
+  } catch { /* its own view tells */ }
+}
+
+function outcome(job) {
+  const { record, session } = job.result;
+  return sheet(session, record);
+}
+
+/** What a capture that failed left in its session all the same. */
+async function kept(place, path, signal) {
+  const job = await get(path, signal);
+  if (job.result || job.status !== "failed") return;
+  const id = job.id;
+  const { items } = await get("/v1/sessions", signal);
+  for (const { name } of items) {
+    const found = await get(`/v1/sessions/${encodeURIComponent(name)}`, signal).catch(() => null);
+    if (!found?.captures.some((capture) => capture.capture_id === id)) continue;
+    const record = await get(`/v1/sessions/${encodeURIComponent(name)}/captures/${encodeURIComponent(id)}`, signal);
+    place.append(...[sheet(name, record)].flat());
+    return;
+  }
+}

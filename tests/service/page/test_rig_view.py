@@ -1,0 +1,81 @@
+"""At the rig, in a real browser: look, test, fire, and see what came; two people at once."""
+
+from __future__ import annotations
+
+import json
+import urllib.request
+from collections.abc import Iterator
+
+import pytest
+from page_visits import Visit, chromium, served
+from stations import write_station
+
+pytestmark = pytest.mark.needs_browser
+NAME = '<img src=x onerror="document.title=1">'
+
+
+@pytest.fixture(scope="module")
+def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    folder = tmp_path_factory.mktemp("lab")
+    with served(folder / "data", write_station(folder / "rig")) as found:
+        yield found
+
+
+@pytest.fixture(scope="module")
+def visits(address: str) -> Iterator[tuple[Visit, Visit]]:
+    with chromium() as browser:
+        yield Visit(browser, address), Visit(browser, address, 820)
+
+
+def read(address: str) -> object:
+    with urllib.request.urlopen(address) as answer:  # noqa: S310 - the service of this test
+        return json.load(answer)
+
+
+def test_a_capture_is_seen_by_everybody_at_the_rig(
+    visits: tuple[Visit, Visit], address: str
+) -> None:
+    one, other = visits
+    one.see("Trigger box: ready")
+    one.press("Self-test")
+    one.see("All is well.")
+    one.page.get_by_label("Subject").fill(NAME)
+    one.page.get_by_label("Session").fill("anna")
+    one.press("Fire")
+    one.page.locator(".sheet img").nth(1).wait_for()
+    shown = one.page.locator(".result h2").inner_text()
+    captures = read(f"{address}v1/captures")
+    assert [item["id"] for item in captures["items"]] == [shown]  # type: ignore[index]
+    assert one.page.evaluate("document.title") == "Rigwright"
+    one.sound()
+    other.see("Trigger box: ready")
+    other.sound()
+
+
+def test_a_countdown_can_be_stopped(visits: tuple[Visit, Visit], address: str) -> None:
+    one, _ = visits
+    before = len(read(f"{address}v1/captures")["items"])  # type: ignore[index]
+    one.page.get_by_label("Countdown, s").fill("30")
+    one.press("Fire")
+    one.page.get_by_role("button", name="press to stop").click()
+    one.page.get_by_role("button", name="Fire", exact=True).wait_for()
+    assert len(read(f"{address}v1/captures")["items"]) == before  # type: ignore[index]
+
+
+def test_a_session_is_looked_at_and_proven(visits: tuple[Visit, Visit]) -> None:
+    _, other = visits
+    other.go("Sessions")
+    other.page.get_by_role("link", name="anna").click()
+    other.page.locator(".sheet img").nth(1).wait_for()
+    other.press("Prove it whole")
+    other.see("Whole: 1 captures")
+    other.sound()
+
+
+@pytest.mark.parametrize("view", ["Calibration", "Design", "Build"])
+def test_views_of_an_empty_service(visits: tuple[Visit, Visit], view: str) -> None:
+    one, _ = visits
+    one.go(view)
+    one.page.locator("main h1").wait_for()
+    one.page.wait_for_load_state("networkidle")
+    one.sound()

@@ -1,0 +1,88 @@
+"""A browser at the page of a service that really runs, and all that it said and asked for."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page
+
+CHROMIUM = Path("/usr/bin/chromium")
+FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"]
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@contextmanager
+def served(data: Path, *stations: Path) -> Iterator[str]:
+    """The address of a service with these stations."""
+    command = [sys.executable, "-m", "service.cli", "serve", "--port", "0", "--data", str(data)]
+    for station in stations:
+        command += ["--station", str(station)]
+    with (data.parent / "service.log").open("w") as log:
+        begun = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, text=True, cwd=ROOT)
+        with begun as process:
+            try:
+                assert process.stdout is not None
+                yield process.stdout.readline().split()[3].removesuffix("/v1;") + "/"
+            finally:
+                process.terminate()
+
+
+@contextmanager
+def chromium() -> Iterator[Browser]:
+    if not CHROMIUM.exists():
+        pytest.skip("Debian's chromium is not installed")
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=FLAGS)
+        yield browser
+        browser.close()
+
+
+class Visit:
+    """One person at one browser."""
+
+    def __init__(self, browser: Browser, address: str, width: int = 1440) -> None:
+        context = browser.new_context(viewport={"width": width, "height": 900})
+        context.set_default_timeout(120_000)
+        self.page: Page = context.new_page()
+        self.address = address
+        self.faults: list[str] = []
+        self.foreign: list[str] = []
+        self.page.on("console", lambda m: self.faults.append(m.text) if m.type == "error" else None)
+        self.page.on("pageerror", lambda error: self.faults.append(str(error)))
+        self.page.on("request", self._asked)
+        self.page.goto(address)
+
+    def _asked(self, request: object) -> None:
+        url = str(request.url)  # type: ignore[attr-defined]
+        if not url.startswith((self.address, "data:", "blob:")):
+            self.foreign.append(url)
+
+    def go(self, view: str) -> None:
+        self.page.get_by_role("navigation").get_by_role("link", name=view, exact=True).click()
+
+    def press(self, name: str) -> None:
+        self.page.get_by_role("button", name=name, exact=True).click()
+
+    def see(self, words: str) -> None:
+        self.page.get_by_text(words).first.wait_for()
+
+    def sound(self) -> None:
+        """Nothing was said on the console, nobody else was asked, and everybody can read it."""
+        from axe_playwright_python.sync_playwright import Axe
+
+        rules = {"runOnly": {"type": "tag", "values": ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa"]}}
+        found = Axe().run(self.page, options={**rules, "iframes": False})
+        told = [f"{v['id']}: {v['nodes'][0]['html'][:200]}" for v in found.response["violations"]]
+        assert told == []
+        assert self.faults == []
+        assert self.foreign == []
