@@ -91,22 +91,22 @@ def _measures(shape: HeadShape) -> Measures:
         )
     )
     return Measures(
-        face_half_width=shape.face_width_mm / (2.0 * kx),
-        jaw_half_width=shape.jaw_width_mm / (2.0 * kx),
-        chin=shape.chin_mm / ky,
-        brow=shape.brow_mm / ky,
-        eye_half_spacing=shape.eye_spacing_mm / (2.0 * kx),
-        eye_depth=shape.eye_depth_mm / ky,
-        nose_length=shape.nose_length_mm / kz,
-        nose_protrusion=shape.nose_protrusion_mm / ky,
-        nose_half_width=shape.nose_width_mm / (2.0 * kx),
-        mouth_half_width=shape.mouth_width_mm / (2.0 * kx),
-        lip=shape.lip_mm / kz,
-        ear_length=shape.ear_length_mm / kz,
-        ear_protrusion=shape.ear_protrusion_mm / kx,
-        neck_radius=shape.neck_width_mm / (2.0 * kx),
-        hair=shape.hair_mm / kz,
-        shoulder_half_width=shape.shoulder_width_mm / (2.0 * kx),
+        face_half_width_mm=shape.face_width_mm / (2.0 * kx),
+        jaw_half_width_mm=shape.jaw_width_mm / (2.0 * kx),
+        chin_mm=shape.chin_mm / ky,
+        brow_mm=shape.brow_mm / ky,
+        eye_half_spacing_mm=shape.eye_spacing_mm / (2.0 * kx),
+        eye_depth_mm=shape.eye_depth_mm / ky,
+        nose_length_mm=shape.nose_length_mm / kz,
+        nose_protrusion_mm=shape.nose_protrusion_mm / ky,
+        nose_half_width_mm=shape.nose_width_mm / (2.0 * kx),
+        mouth_half_width_mm=shape.mouth_width_mm / (2.0 * kx),
+        lip_mm=shape.lip_mm / kz,
+        ear_length_mm=shape.ear_length_mm / kz,
+        ear_protrusion_mm=shape.ear_protrusion_mm / kx,
+        neck_radius_mm=shape.neck_width_mm / (2.0 * kx),
+        hair_mm=shape.hair_mm / kz,
+        shoulder_half_width_mm=shape.shoulder_width_mm / (2.0 * kx),
     )
 
 
@@ -124,10 +124,10 @@ def _axis(
 
 def _grid(measures: Measures) -> tuple[Floats, Floats, Floats]:
     """A grid about the template, finest where the face is."""
-    half = max(118.0, measures.shoulder_half_width + 20.0)
-    low = NECK_CUT_Z_MM - (85.0 if measures.shoulder_half_width > 0.0 else 12.0)
-    high = 112.0 + measures.hair
-    back = 112.0 + measures.hair
+    half = max(118.0, measures.shoulder_half_width_mm + 20.0)
+    low = NECK_CUT_Z_MM - (85.0 if measures.shoulder_half_width_mm > 0.0 else 12.0)
+    high = 112.0 + measures.hair_mm
+    back = 112.0 + measures.hair_mm
     return (
         _axis(-half, half, -102.0, 102.0, 2.3, 4.2),
         _axis(-135.0, back, -130.0, 32.0, 2.3, 4.2),

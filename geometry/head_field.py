@@ -22,22 +22,22 @@ NECK_CUT_Z_MM = -150.0
 class Measures:
     """The head's measures in template millimetres, see ``geometry.head.HeadShape``."""
 
-    face_half_width: float
-    jaw_half_width: float
-    chin: float
-    brow: float
-    eye_half_spacing: float
-    eye_depth: float
-    nose_length: float
-    nose_protrusion: float
-    nose_half_width: float
-    mouth_half_width: float
-    lip: float
-    ear_length: float
-    ear_protrusion: float
-    neck_radius: float
-    hair: float
-    shoulder_half_width: float
+    face_half_width_mm: float
+    jaw_half_width_mm: float
+    chin_mm: float
+    brow_mm: float
+    eye_half_spacing_mm: float
+    eye_depth_mm: float
+    nose_length_mm: float
+    nose_protrusion_mm: float
+    nose_half_width_mm: float
+    mouth_half_width_mm: float
+    lip_mm: float
+    ear_length_mm: float
+    ear_protrusion_mm: float
+    neck_radius_mm: float
+    hair_mm: float
+    shoulder_half_width_mm: float
 
 
 def head_distance(points: Floats, m: Measures) -> Floats:
@@ -50,12 +50,12 @@ def head_distance(points: Floats, m: Measures) -> Floats:
     d = _eyes(p, d, m)
     d = _nose(p, d, m)
     d = _mouth(p, d, m)
-    if m.hair > 0.0:
+    if m.hair_mm > 0.0:
         d = union(d, _hair(p, m), 5.0)
     d = _ear(p, d, m)
-    if m.shoulder_half_width > 0.0:
+    if m.shoulder_half_width_mm > 0.0:
         d = union(d, _shoulders(p, m), 40.0)
-    cut = NECK_CUT_Z_MM - (70.0 if m.shoulder_half_width > 0.0 else 0.0)
+    cut = NECK_CUT_Z_MM - (70.0 if m.shoulder_half_width_mm > 0.0 else 0.0)
     return intersection(d, cut - p[:, 2], 4.0)
 
 
@@ -67,40 +67,40 @@ def _cranium(p: Floats) -> Floats:
 
 def _face(p: Floats, m: Measures) -> Floats:
     """Middle face, cheekbones, jaw and chin."""
-    middle = ellipsoid(p, (0.0, -38.0, -28.0), (m.face_half_width - 12.0, 51.0, 70.0))
-    bone = ellipsoid(p, (m.face_half_width - 20.0, -52.0, -18.0), (17.0, 25.0, 17.0))
+    middle = ellipsoid(p, (0.0, -38.0, -28.0), (m.face_half_width_mm - 12.0, 51.0, 70.0))
+    bone = ellipsoid(p, (m.face_half_width_mm - 20.0, -52.0, -18.0), (17.0, 25.0, 17.0))
     d = union(middle, bone, 22.0)
-    angle = (m.jaw_half_width - 13.0, -6.0, -62.0)
-    jaw = round_cone(p, angle, (15.0, -68.0 - m.chin, -90.0), 15.0, 14.0)
+    angle = (m.jaw_half_width_mm - 13.0, -6.0, -62.0)
+    jaw = round_cone(p, angle, (15.0, -68.0 - m.chin_mm, -90.0), 15.0, 14.0)
     d = union(d, jaw, 20.0)
-    ramus = round_cone(p, angle, (m.face_half_width - 10.0, 2.0, -15.0), 14.0, 14.0)
+    ramus = round_cone(p, angle, (m.face_half_width_mm - 10.0, 2.0, -15.0), 14.0, 14.0)
     d = union(d, ramus, 18.0)
-    chin = ellipsoid(p, (0.0, -71.0 - m.chin, -90.5), (21.0, 19.0, 15.0))
+    chin = ellipsoid(p, (0.0, -71.0 - m.chin_mm, -90.5), (21.0, 19.0, 15.0))
     return union(d, chin, 14.0)
 
 
 def _neck(p: Floats, m: Measures) -> Floats:
     column = round_cone(
-        p, (0.0, 14.0, -45.0), (0.0, 30.0, -240.0), m.neck_radius, m.neck_radius + 4.0
+        p, (0.0, 14.0, -45.0), (0.0, 30.0, -240.0), m.neck_radius_mm, m.neck_radius_mm + 4.0
     )
     muscle = round_cone(p, (46.0, 14.0, -50.0), (14.0, -26.0, -170.0), 12.0, 11.0)
     return union(column, muscle, 16.0)
 
 
 def _brow(p: Floats, m: Measures) -> Floats:
-    inner = round_cone(p, (9.0, -80.0 - m.brow, 21.0), (30.0, -76.0 - m.brow, 25.0), 8.0, 7.5)
-    outer = round_cone(p, (30.0, -76.0 - m.brow, 25.0), (53.0, -57.0, 15.0), 7.5, 6.0)
+    inner = round_cone(p, (9.0, -80.0 - m.brow_mm, 21.0), (30.0, -76.0 - m.brow_mm, 25.0), 8.0, 7.5)
+    outer = round_cone(p, (30.0, -76.0 - m.brow_mm, 25.0), (53.0, -57.0, 15.0), 7.5, 6.0)
     return union(inner, outer, 6.0)
 
 
 def _eyes(p: Floats, d: Floats, m: Measures) -> Floats:
     """Sockets, eyeballs and lids."""
-    x = m.eye_half_spacing
-    socket = ellipsoid(p, (x + 0.5, -93.0, 3.0), (20.0, 9.0 + m.eye_depth, 12.5))
+    x = m.eye_half_spacing_mm
+    socket = ellipsoid(p, (x + 0.5, -93.0, 3.0), (20.0, 9.0 + m.eye_depth_mm, 12.5))
     d = difference(d, socket, 10.0)
-    inner = ellipsoid(p, (15.0, -95.0, 3.0), (7.0, 11.0 + m.eye_depth, 9.0))
+    inner = ellipsoid(p, (15.0, -95.0, 3.0), (7.0, 11.0 + m.eye_depth_mm, 9.0))
     d = difference(d, inner, 8.0)
-    y = -80.0 + m.eye_depth
+    y = -80.0 + m.eye_depth_mm
     ball = sphere(p, (x, y, 1.0), 12.0)
     lids = ellipsoid(p, (x, y - 0.2, 1.0), (14.5, 14.0, 13.8))
     # The lids part along an almond: what two discs of the x-z plane share.
@@ -114,10 +114,10 @@ def _eyes(p: Floats, d: Floats, m: Measures) -> Floats:
 
 
 def _nose(p: Floats, d: Floats, m: Measures) -> Floats:
-    base_z = 6.0 - m.nose_length
-    tip_y = -92.0 - m.nose_protrusion + 9.0
-    w = m.nose_half_width
-    root = (0.0, -81.0 - 0.5 * m.brow, 13.0)
+    base_z = 6.0 - m.nose_length_mm
+    tip_y = -92.0 - m.nose_protrusion_mm + 9.0
+    w = m.nose_half_width_mm
+    root = (0.0, -81.0 - 0.5 * m.brow_mm, 13.0)
     bridge = round_cone(p, root, (0.0, tip_y + 1.0, base_z + 9.0), 6.5, 7.5)
     tip = ellipsoid(p, (0.0, tip_y, base_z + 8.0), (9.5, 9.0, 8.5))
     nose = union(bridge, tip, 6.0)
@@ -133,7 +133,7 @@ def _nose(p: Floats, d: Floats, m: Measures) -> Floats:
 
 
 def _mouth(p: Floats, d: Floats, m: Measures) -> Floats:
-    w, full = m.mouth_half_width, m.lip
+    w, full = m.mouth_half_width_mm, m.lip_mm
     z = -64.0
     muzzle = ellipsoid(p, (0.0, -76.0, z + 2.0), (w + 5.0, 20.0, 20.0))
     d = union(d, muzzle, 14.0)
@@ -155,7 +155,7 @@ def _mouth(p: Floats, d: Floats, m: Measures) -> Floats:
 def _ear(p: Floats, d: Floats, m: Measures) -> Floats:
     """A shell that stands off the head: rim, hollow, tragus and lobe."""
     q = _ear_frame(p, m)
-    s = m.ear_length / 63.0
+    s = m.ear_length_mm / 63.0
     plate = ellipsoid(q, (0.0, 0.0, 0.0), (17.5 * s, 31.0 * s, 6.5))
     hollow = ellipsoid(q, (-1.5 * s, -1.0 * s, 7.5), (12.0 * s, 23.5 * s, 5.0))
     ear = difference(plate, hollow, 2.0)
@@ -171,26 +171,26 @@ def _ear(p: Floats, d: Floats, m: Measures) -> Floats:
 
 def _ear_frame(p: Floats, m: Measures) -> Floats:
     """Points in the ear's own frame: towards its back rim, up, away from the head."""
-    flare = np.arcsin(np.clip(m.ear_protrusion / 36.0, 0.0, 0.95))
+    flare = np.arcsin(np.clip(m.ear_protrusion_mm / 36.0, 0.0, 0.95))
     lean = np.radians(14.0)
     back = np.array([np.sin(flare), np.cos(flare), 0.0])
     out = np.array([np.cos(flare), -np.sin(flare), 0.0])
     up = np.array([0.0, 0.0, 1.0])
     back, up = np.cos(lean) * back - np.sin(lean) * up, np.sin(lean) * back + np.cos(lean) * up
-    centre = np.array([71.5 + 0.5 * m.ear_protrusion - 2.0, 10.0, -12.0])
+    centre = np.array([71.5 + 0.5 * m.ear_protrusion_mm - 2.0, 10.0, -12.0])
     return np.asarray((p - centre) @ np.stack([back, up, out], axis=1))
 
 
 def _hair(p: Floats, m: Measures) -> Floats:
     """A cap of hair over the vault, its line high on the forehead and before the ears."""
-    cap = _cranium(p) - m.hair
+    cap = _cranium(p) - m.hair_mm
     line = 52.0 - 0.75 * (p[:, 1] + 40.0)
     low = np.where(p[:, 1] > 25.0, -60.0, -25.0)
     return intersection(cap, np.maximum(line, low) - p[:, 2], 8.0)
 
 
 def _shoulders(p: Floats, m: Measures) -> Floats:
-    w = m.shoulder_half_width
+    w = m.shoulder_half_width_mm
     beam = round_cone(p, (0.0, 30.0, -205.0), (w - 48.0, 32.0, -222.0), 62.0, 48.0)
     slope = round_cone(p, (25.0, 34.0, -110.0), (w - 45.0, 34.0, -195.0), 22.0, 26.0)
     return union(beam, slope, 30.0)

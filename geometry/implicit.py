@@ -18,28 +18,28 @@ def ellipsoid(points: Floats, centre: tuple[float, ...], radii: tuple[float, ...
     k0 = np.sqrt(np.einsum("ij,ij->i", scaled, scaled))
     scaled /= np.array(radii)
     k1 = np.sqrt(np.einsum("ij,ij->i", scaled, scaled))
-    # At the very centre k1 is 0; the smallest radius is then the distance to the surface.
+    # At the very centre k1 is 0; the smallest radius_mm is then the distance to the surface.
     return np.where(k1 > 1e-12, k0 * (k0 - 1.0) / np.maximum(k1, 1e-12), -min(radii))
 
 
-def sphere(points: Floats, centre: tuple[float, ...], radius: float) -> Floats:
+def sphere(points: Floats, centre: tuple[float, ...], radius_mm: float) -> Floats:
     """Distance to a sphere."""
-    return np.asarray(np.linalg.norm(points - np.array(centre), axis=1) - radius)
+    return np.asarray(np.linalg.norm(points - np.array(centre), axis=1) - radius_mm)
 
 
 def round_cone(
     points: Floats,
     start: tuple[float, ...],
     end: tuple[float, ...],
-    start_radius: float,
-    end_radius: float,
+    start_radius_mm: float,
+    end_radius_mm: float,
 ) -> Floats:
-    """Distance to a rod with round ends whose radius changes evenly from start to end."""
+    """Distance to a rod with round ends whose radius_mm changes evenly from start to end."""
     a, axis = np.array(start), np.array(end) - np.array(start)
     offset = points - a
     along = np.clip(offset @ axis / (axis @ axis), 0.0, 1.0)
     gap = np.linalg.norm(offset - along[:, None] * axis, axis=1)
-    return np.asarray(gap - (start_radius + (end_radius - start_radius) * along))
+    return np.asarray(gap - (start_radius_mm + (end_radius_mm - start_radius_mm) * along))
 
 
 def union(a: Floats, b: Floats, blend: float) -> Floats:

@@ -100,7 +100,7 @@ def _lengths(solution: Solution, network: Network, covariance: Covariance) -> Co
     rows = length_partials(solution.state.target, lengths.first, lengths.second)
     nothing = np.zeros((len(rows), len(covariance.cameras)))
     spread = np.diag(covariance.of_functions(nothing, rows))
-    squares = (solution.residuals.length / lengths.sigma_mm) ** 2
+    squares = (solution.residuals.length_mm / lengths.sigma_mm) ** 2
     # What the loss holds back takes less part in the fit, and is checked by the others more.
     redundancy = 1.0 - solution.length_weights * spread / lengths.sigma_mm**2
     return _component("distances", squares, redundancy)

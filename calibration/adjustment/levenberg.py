@@ -93,7 +93,7 @@ def _cost(state: State, network: Network, limit: float) -> float:
 
 def length_misfits(found: Residuals, network: Network) -> Floats:
     """Each measured distance's residual in sigmas, without its sign, (d,)."""
-    return np.abs(found.length) / network.lengths.sigma_mm
+    return np.abs(found.length_mm) / network.lengths.sigma_mm
 
 
 def _total(found: Residuals, network: Network, limit: float) -> float:

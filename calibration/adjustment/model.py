@@ -31,7 +31,7 @@ class Partials:
     """
 
     pixel: Floats
-    depth: Floats
+    depth_mm: Floats
     camera: Floats
     pose: Floats
     target: Floats

@@ -34,15 +34,15 @@ class Residuals:
     """Observed less computed values, and ``depth`` (n,) of the image points in mm.
 
     ``pixel`` (n, 2); ``interior`` (n, 9), ``exterior`` (n, 6), ``target`` (m, 3) of the priors;
-    ``length`` (d,) of the measured distances.
+    ``length_mm`` (d,) of the measured distances.
     """
 
     pixel: Floats
-    depth: Floats
+    depth_mm: Floats
     interior: Floats
     exterior: Floats
     target: Floats
-    length: Floats
+    length_mm: Floats
 
 
 def _weights(sigma: Floats) -> Floats:
@@ -58,7 +58,7 @@ def _differences(state: State, network: Network) -> tuple[Floats, Floats]:
     return between, np.linalg.norm(between, axis=1)
 
 
-def residuals(state: State, network: Network, pixel: Floats, depth: Floats) -> Residuals:
+def residuals(state: State, network: Network, pixel: Floats, depth_mm: Floats) -> Residuals:
     """All residuals, with the computed pixels and depths already at hand."""
     priors = network.priors
     rotation = state.rotation @ np.swapaxes(priors.rotation, 1, 2)
@@ -66,7 +66,7 @@ def residuals(state: State, network: Network, pixel: Floats, depth: Floats) -> R
     _, computed = _differences(state, network)
     return Residuals(
         network.pixel - pixel,
-        depth,
+        depth_mm,
         priors.interior - state.interior,
         exterior,
         priors.target - state.target,
@@ -121,7 +121,7 @@ class Assembler:
         observed = self._network.observed
         return Partials(
             parts.pixel,
-            parts.depth,
+            parts.depth_mm,
             parts.camera * self._camera_mask[observed.camera][:, None, :],
             parts.pose * self._pose_mask[observed.pose][:, None, :],
             parts.target * self._target_mask[observed.target][:, None, :],
@@ -130,7 +130,7 @@ class Assembler:
     def linearise(self, state: State) -> tuple[Partials, Residuals]:
         """Partials and residuals at ``state``."""
         parts = self.masked(partials(state, self._network.observed))
-        return parts, residuals(state, self._network, parts.pixel, parts.depth)
+        return parts, residuals(state, self._network, parts.pixel, parts.depth_mm)
 
     def gather(self, parts: Partials, found: Residuals, weights: Floats) -> Normals:
         """Normal equations with ``weights`` (n,) of the robust loss times 1 / sigma^2."""

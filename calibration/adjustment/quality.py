@@ -161,7 +161,7 @@ def warnings(
 
 def _worst_length(judged: Judged) -> str:
     """The measured distance that fits worst, in words."""
-    lengths, residual = judged.network.lengths, judged.solution.residuals.length
+    lengths, residual = judged.network.lengths, judged.solution.residuals.length_mm
     worst = int(np.argmax(np.abs(residual) / lengths.sigma_mm))
     ends = [judged.target_ids[int(k[worst])] for k in (lengths.first, lengths.second)]
     return f"most of all {ends[0]}-{ends[1]} by {residual[worst]:+.3f} mm"

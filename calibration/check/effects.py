@@ -54,7 +54,7 @@ def effects(epoch: Epoch, state: State) -> Effects:
             px[k] = np.einsum("nap,naq->pq", parts.camera[own], parts.camera[own]) / own.sum()
             mm[k] = np.einsum("nap,naq->pq", moved[own], moved[own]) / own.sum()
     focal = state.interior[epoch.camera, 0]
-    return Effects(px, mm, float(np.median(parts.depth / focal)), state.rotation)
+    return Effects(px, mm, float(np.median(parts.depth_mm / focal)), state.rotation)
 
 
 def _point_shifts(epoch: Epoch, by_point: Floats, by_camera: Floats) -> Floats:

@@ -97,11 +97,11 @@ def fit_saddles(windows: Windows, start_px: Floats, axes_px: Floats, guard: Guar
 class GuardRule:
     """Which pixels of a window show the corner and nothing else.
 
-    The squares in which both board coordinates have one sign hold markers from ``margin``
+    The squares in which both board coordinates have one sign hold markers from ``margin_squares``
     (in squares) inwards; the others are plain.
     """
 
-    margin: float
+    margin_squares: float
 
     def weights(
         self, windows: Windows, centre_px: Floats, axes_px: Floats, blur_px: Floats
@@ -115,8 +115,8 @@ class GuardRule:
         guard_u = (GUARD * blur_px * np.linalg.norm(axes_px[:, :, 1], axis=1) / area)[:, None]
         guard_v = (GUARD * blur_px * np.linalg.norm(axes_px[:, :, 0], axis=1) / area)[:, None]
         bright = board[..., 0] * board[..., 1] > 0.0
-        near = (u < self.margin - guard_u) | (v < self.margin - guard_v)
-        near |= (u < 0.5 * self.margin) | (v < 0.5 * self.margin)
+        near = (u < self.margin_squares - guard_u) | (v < self.margin_squares - guard_v)
+        near |= (u < 0.5 * self.margin_squares) | (v < 0.5 * self.margin_squares)
         inside = (u < 1.0 - guard_u) & (v < 1.0 - guard_v)
         return np.asarray((inside & (near | ~bright)).astype(np.float64))
 

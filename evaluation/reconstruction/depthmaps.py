@@ -23,11 +23,11 @@ COARSE_STRIDE = 2
 class Matching:
     """How patches are matched.
 
-    ``half_width`` samples to each side of a patch's middle; ``stride_px`` between the middles;
+    ``half_width_samples`` to each side of a patch's middle; ``stride_px`` between the middles;
     ``steps`` Gauss-Newton steps at most; ``least_correlation`` below which a view is dropped.
     """
 
-    half_width: int = 6
+    half_width_samples: int = 6
     stride_px: int = 2
     steps: int = 5
     least_correlation: float = 0.8
@@ -37,14 +37,14 @@ class Matching:
 class DepthMap:
     """What one reference camera measured on a grid of its pixels, each (h, w), NaN where nothing.
 
-    ``inverse_depth`` (1/mm) along the camera's axis at pixels ``stride * (column, row)`` with its
+    ``inverse_depth_per_mm`` along the camera's axis at pixels ``stride * (column, row)`` with its
     ``variance`` (1/mm2) and slopes per pixel (h, w, 2); ``correlation`` mean over the views used,
     ``views`` how many they are, the reference not counted.
     """
 
     reference: View
     stride_px: int
-    inverse_depth: Floats
+    inverse_depth_per_mm: Floats
     slopes: Floats
     variance: Floats
     correlation: Singles
@@ -88,7 +88,7 @@ def refined(
 
     height, width = start.shape
     rows, columns = np.mgrid[0:height, 0:width] * stride_px
-    reach = matching.half_width
+    reach = matching.half_width_samples
     inside = (
         np.isfinite(start)
         & (columns >= reach)
@@ -107,7 +107,7 @@ def refined(
         shifts,
         pixels,
         firsts,
-        matching.half_width,
+        matching.half_width_samples,
         1,
         matching.steps,
         matching.least_correlation,
@@ -127,11 +127,11 @@ def refined(
     )
 
 
-def first_slopes(inverse_depth: Floats, spacing_px: float) -> tuple[Floats, Floats]:
+def first_slopes(inverse_depth_per_mm: Floats, spacing_px: float) -> tuple[Floats, Floats]:
     """A smoothed inverse depth (h, w) and its slopes per pixel (h, w, 2), gaps kept as NaN."""
-    known = np.isfinite(inverse_depth)
+    known = np.isfinite(inverse_depth_per_mm)
     weight = ndimage.gaussian_filter(known.astype(np.float64), 1.5)
-    filled = ndimage.gaussian_filter(np.where(known, inverse_depth, 0.0), 1.5)
+    filled = ndimage.gaussian_filter(np.where(known, inverse_depth_per_mm, 0.0), 1.5)
     smooth = np.where(known, filled / np.maximum(weight, 1e-9), np.nan)
     dy, dx = np.gradient(smooth, spacing_px)
     slopes = np.nan_to_num(np.stack([dx, dy], axis=-1))
@@ -144,8 +144,8 @@ def steady(map_: DepthMap, tolerance_px: float, scale_px_mm: float) -> Bools:
     ``scale_px_mm`` turns inverse depth into pixels of the widest partner (focal length times
     base). A lone patch that went elsewhere is a blunder; a surface is not.
     """
-    known = np.isfinite(map_.inverse_depth)
-    value = np.where(known, map_.inverse_depth, 0.0).astype(np.float32)
+    known = np.isfinite(map_.inverse_depth_per_mm)
+    value = np.where(known, map_.inverse_depth_per_mm, 0.0).astype(np.float32)
     middle = cv2.medianBlur(value, 5)
     return np.asarray(known & (np.abs(value - middle) * scale_px_mm <= tolerance_px))
 
@@ -155,12 +155,12 @@ def grown_start(map_: DepthMap, steps: int) -> tuple[Floats, Floats]:
 
     NaN where there is a patch already or none is near.
     """
-    known = np.isfinite(map_.inverse_depth)
+    known = np.isfinite(map_.inverse_depth_per_mm)
     distance, (iy, ix) = ndimage.distance_transform_edt(~known, return_indices=True)
     rows, columns = np.indices(known.shape)
     slope = map_.slopes[iy, ix]
     value = (
-        map_.inverse_depth[iy, ix]
+        map_.inverse_depth_per_mm[iy, ix]
         + slope[..., 0] * (columns - ix) * map_.stride_px
         + slope[..., 1] * (rows - iy) * map_.stride_px
     )
@@ -170,10 +170,10 @@ def grown_start(map_: DepthMap, steps: int) -> tuple[Floats, Floats]:
 
 def merged(map_: DepthMap, more: DepthMap) -> DepthMap:
     """Both maps of one reference: the first where it knows, else the second."""
-    known = np.isfinite(map_.inverse_depth)
+    known = np.isfinite(map_.inverse_depth_per_mm)
     return replace(
         map_,
-        inverse_depth=np.where(known, map_.inverse_depth, more.inverse_depth),
+        inverse_depth_per_mm=np.where(known, map_.inverse_depth_per_mm, more.inverse_depth_per_mm),
         slopes=np.where(known[..., None], map_.slopes, more.slopes),
         variance=np.where(known, map_.variance, more.variance),
         correlation=np.where(known, map_.correlation, more.correlation),
@@ -199,7 +199,7 @@ def upsampled(
     near = distance[gy, gx] <= 2.0
     slope = map_.slopes[ny, nx]
     value = (
-        map_.inverse_depth[ny, nx]
+        map_.inverse_depth_per_mm[ny, nx]
         + slope[..., 0] * (u - nx * map_.stride_px)
         + slope[..., 1] * (v - ny * map_.stride_px)
     )
@@ -210,7 +210,7 @@ def masked(map_: DepthMap, keep: Bools) -> DepthMap:
     """The same map with NaN where ``keep`` is false."""
     return replace(
         map_,
-        inverse_depth=np.where(keep, map_.inverse_depth, np.nan),
+        inverse_depth_per_mm=np.where(keep, map_.inverse_depth_per_mm, np.nan),
         variance=np.where(keep, map_.variance, np.nan),
         views=np.where(keep, map_.views, 0).astype(np.int8),
     )

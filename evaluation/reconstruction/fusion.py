@@ -47,8 +47,8 @@ def measured_points(map_: DepthMap) -> MeasuredPoints:
     ``n = K' (a, b, rho - a u - b v)``: so its normal is exact too. ``resolution`` (N,) is the
     pixels that a square millimetre of the surface fills.
     """
-    rows, columns = np.nonzero(np.isfinite(map_.inverse_depth))
-    rho = map_.inverse_depth[rows, columns]
+    rows, columns = np.nonzero(np.isfinite(map_.inverse_depth_per_mm))
+    rho = map_.inverse_depth_per_mm[rows, columns]
     slope = map_.slopes[rows, columns]
     view = map_.reference
     u, v = columns * float(map_.stride_px), rows * float(map_.stride_px)
@@ -78,14 +78,14 @@ def _seen_in(map_: DepthMap, points: MeasuredPoints) -> tuple[Bools, Floats, Flo
     depth = local[:, 2]
     with np.errstate(divide="ignore", invalid="ignore"):
         pixel = (local / depth[:, None]) @ view.matrix.T
-    grid_h, grid_w = map_.inverse_depth.shape
+    grid_h, grid_w = map_.inverse_depth_per_mm.shape
     gx = np.nan_to_num(np.rint(pixel[:, 0] / map_.stride_px), nan=-1.0, posinf=-1.0, neginf=-1.0)
     gy = np.nan_to_num(np.rint(pixel[:, 1] / map_.stride_px), nan=-1.0, posinf=-1.0, neginf=-1.0)
     inside = (depth > 0) & (gx >= 0) & (gy >= 0) & (gx < grid_w) & (gy < grid_h)
     ix, iy = np.where(inside, gx, 0).astype(np.int64), np.where(inside, gy, 0).astype(np.int64)
     slope = map_.slopes[iy, ix]
     rho = (
-        map_.inverse_depth[iy, ix]
+        map_.inverse_depth_per_mm[iy, ix]
         + slope[:, 0] * (pixel[:, 0] - ix * map_.stride_px)
         + slope[:, 1] * (pixel[:, 1] - iy * map_.stride_px)
     )
@@ -118,7 +118,7 @@ def best_references(maps: Sequence[DepthMap], most: int) -> list[Bools]:
             cosine = -np.einsum("ij,ij->i", mine.normals, rays) / distance
             theirs = view.matrix[0, 0] ** 2 / distance**2 * np.maximum(cosine, 0.0)
             better += known & (np.abs(along) < 4.0 * AGREE_MM) & (theirs > mine.resolution)
-        mask = np.zeros(map_.inverse_depth.shape, dtype=bool)
+        mask = np.zeros(map_.inverse_depth_per_mm.shape, dtype=bool)
         mask[mine.rows, mine.columns] = better < most
         keep.append(mask)
     return keep

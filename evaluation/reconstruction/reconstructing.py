@@ -62,8 +62,8 @@ class ReconstructionOptions:
     stride_px: int = 2
     growth: int = 3
     stray_mm: float = 0.05
-    half: Matching = field(default_factory=lambda: Matching(half_width=4, steps=6))
-    full: Matching = field(default_factory=lambda: Matching(half_width=4, steps=5))
+    half: Matching = field(default_factory=lambda: Matching(half_width_samples=4, steps=6))
+    full: Matching = field(default_factory=lambda: Matching(half_width_samples=4, steps=5))
     workers: int = 2
 
 
@@ -273,7 +273,9 @@ def _result(
     )
     left = np.bincount(owner[keep], minlength=len(parts))
     cameras = tuple(
-        CameraShare(v.name, tried[k], int(np.isfinite(maps[k].inverse_depth).sum()), int(left[k]))
+        CameraShare(
+            v.name, tried[k], int(np.isfinite(maps[k].inverse_depth_per_mm).sum()), int(left[k])
+        )
         for k, v in enumerate(network.full)
     )
     return Reconstruction(cloud, network.volume, cameras)

@@ -27,7 +27,7 @@ from solver.result import Design, Quality
 SCHEMA = "rigwright.design/1"
 EVALUATION_SCHEMA = "rigwright.evaluation/1"
 LARGEST_FILE_BYTES = 200_000_000
-SAME_ANGLE = 1e-3
+SAME_ROTATION = 1e-3
 """Largest difference of a matrix to the one its angles give before they contradict each other."""
 
 SAME_MATRIX_PX = 1e-6
@@ -203,7 +203,7 @@ def _pose(placed: PlacedCamera, source: str) -> Pose:
     rotation = nearest_rotation(np.array(placed.rotation_rig_to_camera))
     if angles is not None:
         off = np.abs(rotation_from_omega_phi_kappa(np.array(angles)) - rotation).max()
-        if off > SAME_ANGLE:
+        if off > SAME_ROTATION:
             raise InputError(
                 "value",
                 f"{source}: rotation_rig_to_camera and omega_phi_kappa_deg of camera "

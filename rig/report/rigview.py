@@ -38,7 +38,7 @@ def rig_figure(
     figure.add_trace(lines_trace(_view_edges(design.cameras, centre), AFTER, "views"))
     axes = _axes(design.cameras, centre)
     figure.add_trace(
-        lines_trace(axes, AFTER, "optical axes", width=2.0, dotted=True, visible="legendonly")
+        lines_trace(axes, AFTER, "optical axes", width_px=2.0, dotted=True, visible="legendonly")
     )
     start = _view_edges(design.start_cameras, centre)
     figure.add_trace(lines_trace(start, BEFORE, "start, before optimisation", visible="legendonly"))

@@ -33,7 +33,7 @@ def lines_trace(
     colour: str,
     name: str,
     *,
-    width: float = 3.0,
+    width_px: float = 3.0,
     dotted: bool = False,
     **more: object,
 ) -> go.Scatter3d:
@@ -42,7 +42,7 @@ def lines_trace(
 
     gaps = np.full((len(segments), 1, 3), np.nan)
     x, y, z = np.concatenate([segments, gaps], axis=1).reshape(-1, 3).T.astype(np.float32)
-    line = {"color": colour, "width": width} | ({"dash": "dot"} if dotted else {})
+    line = {"color": colour, "width": width_px} | ({"dash": "dot"} if dotted else {})
     return go.Scatter3d(x=x, y=y, z=z, mode="lines", line=line, name=name, hoverinfo="skip", **more)
 
 

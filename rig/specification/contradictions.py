@@ -13,7 +13,7 @@ from geometry.camera import Camera
 from geometry.optics import blur_ratio
 from solver.limits import Limits
 
-LARGEST_BASE_HEIGHT = 2.0
+LARGEST_BASE_HEIGHT_RATIO = 2.0
 """Two cameras are never farther apart than the sum of their distances to the object."""
 
 
@@ -53,10 +53,10 @@ def _check_views(limits: Limits, cameras_in_all: int) -> None:
 def _check_base_height(limits: Limits) -> None:
     ratio = limits.base_height
     for label, low in (("min", ratio.min), ("mean_min", ratio.mean_min)):
-        if low is not None and low > LARGEST_BASE_HEIGHT:
+        if low is not None and low > LARGEST_BASE_HEIGHT_RATIO:
             raise _clash(
                 f"limits.base_height.{label} is {low:g}",
-                f"no base/height exceeds {LARGEST_BASE_HEIGHT:g}",
+                f"no base/height exceeds {LARGEST_BASE_HEIGHT_RATIO:g}",
                 "give a smaller ratio",
             )
     pairs = (

@@ -59,7 +59,7 @@ def dense_rows(network: Network, state: State) -> Floats:
                 (found.pixel / network.sigma_px).ravel(),
                 (found.target[finite] / priors.target_sigma[finite]),
                 (found.interior[known] / priors.interior_sigma[known]),
-                found.length / network.lengths.sigma_mm,
+                found.length_mm / network.lengths.sigma_mm,
             ]
         )
 

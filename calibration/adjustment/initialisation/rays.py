@@ -6,7 +6,7 @@ import numpy as np
 
 from geometry.arrays import Floats, Ints
 
-LEAST_ANGLE = 1e-4
+LEAST_ANGLE_RAD = 1e-4
 """Rays that meet at less than this (radians, about) say nothing of the depth."""
 
 
@@ -24,7 +24,7 @@ def nearest_points(
     right = _sums(np.einsum("nij,nj->ni", across, origins), group, count)
     rays = np.bincount(group, minlength=count)
     sizes = np.linalg.eigvalsh(matrix)
-    good = (rays >= 2) & (sizes[:, 0] > LEAST_ANGLE**2 * np.maximum(sizes[:, 2], 1e-300))
+    good = (rays >= 2) & (sizes[:, 0] > LEAST_ANGLE_RAD**2 * np.maximum(sizes[:, 2], 1e-300))
     points = np.full((count, 3), np.nan)
     points[good] = np.linalg.solve(matrix[good], right[good][:, :, None])[:, :, 0]
     return points

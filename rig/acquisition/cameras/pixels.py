@@ -30,7 +30,7 @@ def understood(pixel_format: str) -> bool:
     return name in _CHANNELS or bool(single and not (single[3] and single[2] in ("8", "16")))
 
 
-def decode(pixel_format: str, width: int, height: int, buffer: bytes) -> Image:
+def decode(pixel_format: str, width_px: int, height_px: int, buffer: bytes) -> Image:
     """The image in a buffer: (H, W) for Mono, (H, W, 3) RGB for colour and Bayer formats.
 
     Bayer mosaics are interpolated by OpenCV (bilinear). Bytes after the image are ignored.
@@ -40,13 +40,15 @@ def decode(pixel_format: str, width: int, height: int, buffer: bytes) -> Image:
     if name in _CHANNELS:
         order = _CHANNELS[name]
         samples = 4 if "a" in name else 3
-        flat = _take(np.frombuffer(buffer, np.uint8), width * height * samples)
-        return np.ascontiguousarray(flat.reshape(height, width, samples)[:, :, order])
+        flat = _take(np.frombuffer(buffer, np.uint8), width_px * height_px * samples)
+        return np.ascontiguousarray(flat.reshape(height_px, width_px, samples)[:, :, order])
     single = _SINGLE.fullmatch(name)
     if not single or not understood(name):
         raise ValueError(f"pixel format {pixel_format} is not understood")
     bits = int(single[2])
-    image = _unpack(buffer, bits, bool(single[3]), width * height).reshape(height, width)
+    image = _unpack(buffer, bits, bool(single[3]), width_px * height_px).reshape(
+        height_px, width_px
+    )
     return image if single[1] == "Mono" else _interpolate(single[1], image)
 
 

@@ -155,9 +155,9 @@ class BoxClient:
             return None
         return Event(number, fields.pop("name", ""), fields)
 
-    def set_output(self, output: int, delay: int, width: int) -> None:
+    def set_output(self, output: int, delay_ticks: int, width_ticks: int) -> None:
         """Delay and width of one output, in ticks."""
-        self._ask("OUT", {"ch": str(output), "d": str(delay), "w": str(width)})
+        self._ask("OUT", {"ch": str(output), "d": str(delay_ticks), "w": str(width_ticks)})
 
     def arm(self, program: Program) -> tuple[int, int]:
         """Arm; the number of edges and the duration that the box made of it."""
@@ -165,7 +165,7 @@ class BoxClient:
             "cap": program.capture_id,
             "mask": f"{program.mask:04X}",
             "n": str(program.shots),
-            "iv": str(program.interval),
+            "iv": str(program.interval_ticks),
             "lead": str(program.lead),
             "ttl": str(program.ttl_ms),
         }

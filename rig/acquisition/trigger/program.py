@@ -16,10 +16,10 @@ MIN_PAUSE_TICKS = 2000
 
 _LIMITS = {
     "tick_ns": "tick_ns",
-    "max_delay": "dmax",
-    "max_width": "wmax",
-    "max_strobe_width": "smax",
-    "gap": "gap",
+    "max_delay_ticks": "dmax",
+    "max_width_ticks": "wmax",
+    "max_strobe_width_ticks": "smax",
+    "gap_ticks": "gap",
     "max_edges": "edges",
     "max_shots": "shots",
     "hold_ms": "hold",
@@ -47,9 +47,11 @@ class BoxSafety:
             *(int(fields[name]) for name in ("dm", "dmmin", "dmmax", "srest", "sduty"))
         )
 
-    def strobe_interval(self, width: int) -> int:
+    def strobe_interval(self, width_ticks: int) -> int:
         """From one pulse of a strobe to the next one, at least, in ticks."""
-        return max(width + self.strobe_rest, -(-width * 100 // self.strobe_duty_percent))
+        return max(
+            width_ticks + self.strobe_rest, -(-width_ticks * 100 // self.strobe_duty_percent)
+        )
 
 
 @dataclass(frozen=True)
@@ -57,10 +59,10 @@ class BoxLimits:
     """``CAP?`` as numbers. Times in ticks but ``hold_ms``."""
 
     tick_ns: int
-    max_delay: int
-    max_width: int
-    max_strobe_width: int
-    gap: int
+    max_delay_ticks: int
+    max_width_ticks: int
+    max_strobe_width_ticks: int
+    gap_ticks: int
     max_edges: int
     max_shots: int
     hold_ms: int
@@ -95,8 +97,8 @@ class BoxLimits:
         return TriggerCapabilities(
             outputs=OUTPUTS,
             tick_us=tick_us,
-            max_delay_us=self.max_delay * tick_us,
-            max_width_us=self.max_width * tick_us,
+            max_delay_us=self.max_delay_ticks * tick_us,
+            max_width_us=self.max_width_ticks * tick_us,
             max_shots=self.max_shots,
             acknowledges_fire=True,
             edge_log=True,
@@ -112,7 +114,7 @@ class Program:
     capture_id: str
     pulses: Mapping[int, tuple[int, int]]
     shots: int
-    interval: int
+    interval_ticks: int
     lead: int
     ttl_ms: int
     edges: tuple[OutputEdge, ...]
@@ -132,7 +134,7 @@ class Program:
     @property
     def total(self) -> int:
         """From FIRE to the last edge of all."""
-        return self.lead + (self.shots - 1) * self.interval + self.duration
+        return self.lead + (self.shots - 1) * self.interval_ticks + self.duration
 
 
 def compile_program(request: ArmRequest, limits: BoxLimits) -> Program:
@@ -159,7 +161,7 @@ def compile_program(request: ArmRequest, limits: BoxLimits) -> Program:
         capture_id=request.capture_id,
         pulses=pulses,
         shots=request.shots,
-        interval=round(request.interval_us * ticks_per_us) if request.shots > 1 else 0,
+        interval_ticks=round(request.interval_us * ticks_per_us) if request.shots > 1 else 0,
         lead=round(request.lead_us * ticks_per_us),
         ttl_ms=round(request.expires_s * 1000.0),
         edges=edges,
@@ -176,13 +178,13 @@ def _check_pulse(output: int, pulse: Pulse, ticks: tuple[int, int], limits: BoxL
         raise InputError(
             "trigger-output", f"the box has no output {output}", f"use outputs 1 to {OUTPUTS}"
         )
-    widest = limits.max_strobe_width if output in STROBES else limits.max_width
+    widest = limits.max_strobe_width_ticks if output in STROBES else limits.max_width_ticks
     tick_us = limits.tick_ns / 1000.0
-    if ticks[0] > limits.max_delay:
+    if ticks[0] > limits.max_delay_ticks:
         raise InputError(
             "trigger-delay",
             f"output {output} cannot wait {pulse.delay_us:g} us",
-            f"stay within {limits.max_delay * tick_us:g} us",
+            f"stay within {limits.max_delay_ticks * tick_us:g} us",
         )
     if ticks[1] > widest:
         raise InputError(
@@ -203,8 +205,8 @@ def _check_edges(edges: tuple[OutputEdge, ...], limits: BoxLimits) -> None:
             f"{len(edges)} different instants in a shot are more than {limits.max_edges}",
             "let some pulses begin or end together",
         )
-    if nearest(edges) < limits.gap:
-        least_us = limits.gap * limits.tick_ns / 1000.0
+    if nearest(edges) < limits.gap_ticks:
+        least_us = limits.gap_ticks * limits.tick_ns / 1000.0
         raise InputError(
             "trigger-gap",
             f"two edges are nearer than {least_us:g} us",
@@ -221,13 +223,13 @@ def _check_times(program: Program, limits: BoxLimits) -> None:
             f"ask for 1 to {limits.max_shots}",
         )
     shortest = program.duration + MIN_PAUSE_TICKS
-    if program.shots > 1 and program.interval < shortest:
+    if program.shots > 1 and program.interval_ticks < shortest:
         raise InputError(
             "trigger-interval",
-            f"shots every {program.interval * tick_us:g} us overlap",
+            f"shots every {program.interval_ticks * tick_us:g} us overlap",
             f"leave {shortest * tick_us:g} us or more from start to start",
         )
-    if not MIN_LEAD_TICKS <= program.lead <= limits.max_delay:
+    if not MIN_LEAD_TICKS <= program.lead <= limits.max_delay_ticks:
         raise InputError(
             "trigger-lead",
             f"a lead of {program.lead * tick_us:g} us cannot be kept",
@@ -253,11 +255,12 @@ def _check_safety(program: Program, safety: BoxSafety, tick_us: float) -> None:
     for output in STROBES:
         width = program.pulses.get(output, (0, 0))[1]
         shortest = safety.strobe_interval(width)
-        if width and program.shots > 1 and program.interval < shortest:
+        if width and program.shots > 1 and program.interval_ticks < shortest:
             raise InputError(
                 "trigger-strobe-rest",
                 f"output {output}, a strobe, cannot flash for {width * tick_us:g} us every "
-                f"{program.interval * tick_us:g} us: it must rest {safety.strobe_rest * tick_us:g} "
-                f"us and be on for at most {safety.strobe_duty_percent} % of the time",
+                f"{program.interval_ticks * tick_us:g} us: it must rest "
+                f"{safety.strobe_rest * tick_us:g} us and be on for at most "
+                f"{safety.strobe_duty_percent} % of the time",
                 f"leave {shortest * tick_us:g} us or more from start to start",
             )

@@ -34,13 +34,13 @@ def merged(ordinates: Sequence[Ordinate]) -> list[Ordinate]:
     return out
 
 
-def spread(places: Floats, pitch: float) -> Floats:
-    """Places at least ``pitch`` apart, in the same order and as near as they can be (N,)."""
+def spread(places: Floats, pitch_mm: float) -> Floats:
+    """Places at least ``pitch_mm`` apart, in the same order and as near as they can be (N,)."""
     from scipy.optimize import isotonic_regression
 
     if not len(places):
         return places
-    comb = pitch * np.arange(len(places))
+    comb = pitch_mm * np.arange(len(places))
     return np.asarray(isotonic_regression(places - comb).x + comb)
 
 
@@ -83,22 +83,24 @@ class Labels:
         """Nothing is to be written in this box."""
         self.taken.append((float(low[0]), float(low[1]), float(high[0]), float(high[1])))
 
-    def place(self, words: str, x: float, y: float, height: float, style: str) -> list[Item]:
+    def place(self, words: str, x: float, y: float, height_mm: float, style: str) -> list[Item]:
         """A name beside a point, with a line to it where it had to go far."""
-        width = text_width_mm(words, height)
+        width = text_width_mm(words, height_mm)
         for distance in (2.5, 4.0, 6.0, 9.0, 13.0, 18.0, 24.0):
             for angle in np.radians([40, 140, -40, -140, 90, -90, 0, 180, 65, 115, -65, -115]):
                 cx = x + (distance + width / 2.0) * np.cos(angle)
-                cy = y + (distance + height / 2.0) * np.sin(angle)
+                cy = y + (distance + height_mm / 2.0) * np.sin(angle)
                 area = (
                     cx - width / 2 - 0.5,
-                    cy - height / 2 - 0.5,
+                    cy - height_mm / 2 - 0.5,
                     cx + width / 2 + 0.5,
-                    cy + height / 2 + 0.5,
+                    cy + height_mm / 2 + 0.5,
                 )
                 if not any(_overlap(area, other) for other in self.taken):
-                    return self._placed(words, (x, y), (float(cx), float(cy)), area, height, style)
-        return self._placed(words, (x, y), (x, y + height), (x, y, x, y), height, style)
+                    return self._placed(
+                        words, (x, y), (float(cx), float(cy)), area, height_mm, style
+                    )
+        return self._placed(words, (x, y), (x, y + height_mm), (x, y, x, y), height_mm, style)
 
     def _placed(
         self,
@@ -106,11 +108,11 @@ class Labels:
         point: tuple[float, float],
         centre: tuple[float, float],
         area: tuple[float, float, float, float],
-        height: float,
+        height_mm: float,
         style: str,
     ) -> list[Item]:
         self.taken.append(area)
-        text = Text(words, centre[0], centre[1] - height / 2.0, height, "middle", style=style)
+        text = Text(words, centre[0], centre[1] - height_mm / 2.0, height_mm, "middle", style=style)
         near = np.clip(point, [area[0], area[1]], [area[2], area[3]])
         if np.linalg.norm(near - point) < 3.0:
             return [text]

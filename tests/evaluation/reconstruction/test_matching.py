@@ -19,15 +19,15 @@ def matched(noise: float, off_px: float):  # type: ignore[no-untyped-def]  # noq
     # One pixel of the widest pair is 1 / (focal length x base).
     start = truth + off_px / (scenes.FOCAL_PX * 115.0)
     slopes = np.zeros((*truth.shape, 2))
-    found = refined(views[0], views[1:], start, slopes, 4, Matching(half_width=4, steps=8))
+    found = refined(views[0], views[1:], start, slopes, 4, Matching(half_width_samples=4, steps=8))
     return truth, found
 
 
 def test_a_slanted_plane_is_found_exactly_from_a_pixel_away() -> None:
     truth, found = matched(0.0, 1.0)
-    inside = np.isfinite(found.inverse_depth)
+    inside = np.isfinite(found.inverse_depth_per_mm)
     assert inside.mean() > 0.6
-    error_mm = (1 / found.inverse_depth - 1 / truth)[inside]
+    error_mm = (1 / found.inverse_depth_per_mm - 1 / truth)[inside]
     # Bilinear samples of a wave of 4 mm (9 px) are off by up to 1/8 (2 pi / 9)^2 = 6 % of its
     # amplitude midway between pixels; over a patch the phases average. 0.03 px of 0.45 mm
     # x 420 / 115 (height to base) are 0.05 mm.
@@ -42,9 +42,11 @@ def test_a_slanted_plane_is_found_exactly_from_a_pixel_away() -> None:
 def test_the_stated_variance_is_that_of_the_scatter() -> None:
     _, found = matched(0.01, 0.3)
     _, clean = matched(0.0, 0.3)
-    inside = np.isfinite(found.inverse_depth) & np.isfinite(clean.inverse_depth)
+    inside = np.isfinite(found.inverse_depth_per_mm) & np.isfinite(clean.inverse_depth_per_mm)
     # Against the same pictures without noise: what interpolation adds is the same in both.
-    z = ((found.inverse_depth - clean.inverse_depth) / np.sqrt(found.variance))[inside]
+    z = ((found.inverse_depth_per_mm - clean.inverse_depth_per_mm) / np.sqrt(found.variance))[
+        inside
+    ]
     spread = 1.4826 * np.median(np.abs(z))
     # 1,500 patches that overlap: the spread itself is known to about 4 %. The gradient is taken
     # from noisy pixels too, which is not in the covariance: a tenth at this noise.
@@ -56,6 +58,6 @@ def test_a_view_of_something_else_is_left_out() -> None:
     views[2] = scenes.plane_view("other", views[2].pose, normal=np.array([0.9, -0.4, 0.2]))
     truth = scenes.true_inverse_depth(views[0])[::6, ::6]
     found = refined(views[0], views[1:], truth, np.zeros((*truth.shape, 2)), 6, Matching())
-    inside = np.isfinite(found.inverse_depth)
+    inside = np.isfinite(found.inverse_depth_per_mm)
     assert np.median(found.views[inside]) == 2
-    assert np.median(np.abs(1 / found.inverse_depth - 1 / truth)[inside]) < 0.03
+    assert np.median(np.abs(1 / found.inverse_depth_per_mm - 1 / truth)[inside]) < 0.03

@@ -122,10 +122,10 @@ def _cap(box: FakeBox, _: Fields) -> Fields:
         "proto": 1,
         "out": OUTPUTS,
         "tick_ns": 500,
-        "dmax": limits.max_delay,
-        "wmax": limits.max_width,
-        "smax": limits.max_strobe_width,
-        "gap": limits.gap,
+        "dmax": limits.max_delay_ticks,
+        "wmax": limits.max_width_ticks,
+        "smax": limits.max_strobe_width_ticks,
+        "gap": limits.gap_ticks,
         "edges": limits.max_edges,
         "shots": limits.max_shots,
         "hold": limits.hold_ms,
@@ -229,7 +229,7 @@ def _shot(box: FakeBox, fields: Fields) -> Fields:
 
 def _out(box: FakeBox, fields: Fields) -> Fields:
     output = _number(fields, "ch", 1, OUTPUTS)
-    delay = _number(fields, "d", 0, box.limits.max_delay)
+    delay = _number(fields, "d", 0, box.limits.max_delay_ticks)
     width = _number(fields, "w", 0, box.limits.width_of(output))
     if box.state == "FIRING":
         raise Refusal(ErrorCode.BUSY)
@@ -251,7 +251,7 @@ def _arm(box: FakeBox, fields: Fields) -> Fields:
     if not re.fullmatch(r"[0-9A-F]{4}", fields["mask"]):
         raise Refusal(ErrorCode.TYPE)
     shots = _number(fields, "n", 1, box.limits.max_shots)
-    lead = _number(fields, "lead", MIN_LEAD, box.limits.max_delay)
+    lead = _number(fields, "lead", MIN_LEAD, box.limits.max_delay_ticks)
     ttl_ms = _number(fields, "ttl", 1, box.limits.hold_ms)
     dead_man_ms = _dead_man_ms(box, fields)
     _refuse_unless_idle(box)
@@ -262,9 +262,9 @@ def _arm(box: FakeBox, fields: Fields) -> Fields:
     edges = compile_edges(box.pulses, int(fields["mask"], 16))
     if not edges:
         raise Refusal(ErrorCode.NOTHING)
-    if len(edges) > box.limits.max_edges or nearest(edges) < box.limits.gap:
+    if len(edges) > box.limits.max_edges or nearest(edges) < box.limits.gap_ticks:
         raise Refusal(ErrorCode.EDGES)
-    highest = box.limits.max_delay + box.limits.max_width + MIN_PAUSE
+    highest = box.limits.max_delay_ticks + box.limits.max_width_ticks + MIN_PAUSE
     strobes = box.strobes(int(fields["mask"], 16))
     rests = [box.limits.rest_after(width) for _, width in strobes]
     needed = (width + rest for (_, width), rest in zip(strobes, rests, strict=True))

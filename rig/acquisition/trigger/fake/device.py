@@ -123,7 +123,7 @@ class FakeBox:
         if self.armed is None:
             return None
         if self.state == "FIRING":
-            start = self.armed.start + self._shot * self.armed.interval
+            start = self.armed.start + self._shot * self.armed.interval_ticks
             edge = start + self.armed.edges[self._edge].at
             silent = self._silent_at()
             return edge if silent is None else min(edge, silent)
@@ -191,7 +191,7 @@ class FakeBox:
         capture = self.armed
         if capture is None:
             return
-        start = capture.start + self._shot * capture.interval
+        start = capture.start + self._shot * capture.interval_ticks
         edge = capture.edges[self._edge]
         late = self._random.randint(0, self.settings.jitter_ticks)
         self._set_pins(edge.pins, start + edge.at + late)

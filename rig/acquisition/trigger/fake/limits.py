@@ -11,10 +11,10 @@ from rig.acquisition.trigger.edges import STROBES
 class FakeLimits:
     """What ``CAP?`` and ``SAFE?`` report, in ticks but where a name ends in ``_ms``."""
 
-    max_delay: int = 60_000_000
-    max_width: int = 10_000_000
-    max_strobe_width: int = 200_000
-    gap: int = 40
+    max_delay_ticks: int = 60_000_000
+    max_width_ticks: int = 10_000_000
+    max_strobe_width_ticks: int = 200_000
+    gap_ticks: int = 40
     max_edges: int = 32
     max_shots: int = 255
     hold_ms: int = 600_000
@@ -25,13 +25,13 @@ class FakeLimits:
     strobe_duty: int = 4
     """A strobe may be on for one part in so many."""
 
-    def rest_after(self, width: int) -> int:
+    def rest_after(self, width_ticks: int) -> int:
         """How long a strobe is off after a pulse of that width, at least."""
-        return max(self.strobe_rest, width * (self.strobe_duty - 1))
+        return max(self.strobe_rest, width_ticks * (self.strobe_duty - 1))
 
     def width_of(self, output: int) -> int:
         """The widest pulse of one output."""
-        return self.max_strobe_width if output in STROBES else self.max_width
+        return self.max_strobe_width_ticks if output in STROBES else self.max_width_ticks
 
 
 @dataclass(frozen=True)

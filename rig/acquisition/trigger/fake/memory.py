@@ -32,7 +32,7 @@ class Capture:
     id: str
     boot: int
     shots_wanted: int
-    interval: int
+    interval_ticks: int
     lead: int
     edges: tuple[OutputEdge, ...]
     dead_man_ms: int
