@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,8 +13,10 @@ from simulated_rigs import STRONG, lens, placed
 
 from common.errors import InputError
 from geometry.camera import RigCamera
+from rig.simulation import studio
 from rig.simulation.flats import Flat, held_up, target
 from rig.simulation.flatsettings import HeldSettings, PlaceSettings, TargetSettings
+from rig.simulation.raytable import RayTables
 from rig.simulation.settings import HeadSettings, SceneSettings, SensorSettings
 from rig.simulation.studio import Shot, Studio
 
@@ -22,6 +25,15 @@ CAMERA = placed(lens(1600, 30.0, STRONG), (180.0, -800.0, 120.0), target_mm=(0.0
 SHOT = Shot("cam01", 3000.0, pixel_format="Mono16")
 """Linear and not overexposed: the sRGB curve moves edges towards the dark by a tenth of a pixel,
 and clipped white by more."""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _rays_worked_out_once() -> Iterator[None]:
+    """Every studio here has the same lens, and its rays take nine tenths of a picture's time."""
+    shared = RayTables()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(studio, "RayTables", lambda: shared)
+        yield
 
 
 def scene(*targets: TargetSettings) -> SceneSettings:
