@@ -40,11 +40,6 @@ def blur_disk_mm(
     return np.asarray(scale * np.abs(depth_mm - focus_distance_mm) / depth_mm)
 
 
-def airy_disk_mm(f_number: float, wavelength_mm: float = 0.00055) -> float:
-    """Diameter of the Airy disk on the sensor at infinity focus (2.44 lambda N)."""
-    return 2.44 * wavelength_mm * f_number
-
-
 def ground_sample_distance_mm(depth_mm: Floats, focal_length_px: float) -> Floats:
     """Size of one pixel at the depth of each point (N,), seen square on, (N,)."""
     return np.asarray(depth_mm) / focal_length_px

@@ -57,11 +57,6 @@ def load_vectors() -> dict[str, Any]:
     return vectors
 
 
-def actions_needed(dialogue: Mapping[str, Any]) -> frozenset[str]:
-    """The ``do`` steps of a dialogue."""
-    return frozenset(step["do"] for step in dialogue["steps"] if "do" in step)
-
-
 def fill(template: str, values: Mapping[str, str]) -> str:
     """A line or field with its placeholders filled; checksums last, of what precedes them."""
 
