@@ -43,6 +43,7 @@ STATUS_OF_CODE: Mapping[str, int] = {
     "input/unmarked": 403,
     "input/body-slow": 408,
     "conflict/queue-full": 503,
+    "conflict/not-ready": 503,
     "internal/disk-full": 507,
     "conflict/disk-full": 507,
     "internal/stopping": 503,

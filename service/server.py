@@ -75,6 +75,11 @@ class _Server(uvicorn.Server):
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         self._service.announce_stop()
         await super().shutdown(sockets)
+        for connection in list(self.server_state.connections):
+            # Its client takes nothing: what is still to be sent would be waited for without end.
+            if connection.transport is not None:
+                connection.transport.abort()
+        await asyncio.sleep(0)
 
 
 def serve(service: Service, app: FastAPI, ready: Callable[[str], None]) -> None:

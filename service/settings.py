@@ -48,6 +48,13 @@ class Settings(BaseSettings):
             "commas, such as `http://lab.example:3000`."
         ),
     ] = ()
+    root_path: Annotated[
+        str,
+        Field(
+            pattern=r"^(/[A-Za-z0-9._~-]+)*$",
+            description="What a proxy puts before all paths, such as `/rigwright`.",
+        ),
+    ] = ""
     data_dir: Annotated[Path, Field(description="Folder for everything the service keeps.")] = (
         Field(default_factory=default_data_folder)
     )

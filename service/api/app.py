@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
-from typing import Any
 
 from anyio import to_thread
 from fastapi import FastAPI
-from fastapi.openapi.utils import get_openapi
+from starlette.middleware.cors import CORSMiddleware
 
 from service.api import (
     acceptances,
@@ -16,9 +15,12 @@ from service.api import (
     captures,
     checks,
     designs,
+    document,
     evaluations,
     examples,
     exports,
+    health,
+    metrics,
     picturesets,
     plans,
     rigs,
@@ -28,18 +30,21 @@ from service.api import (
     sessions,
     targetsets,
 )
+from service.api.addresses import Prefix
+from service.api.conditional import Conditional
 from service.api.context import Service
 from service.api.errors import install_error_handlers
 from service.api.gate import Gate
 from service.api.limits import PAUSE_S, BodyLimits
 from service.api.middleware import RequestLog
-from service.api.models import Problem, problems
 from service.page.routes import router as page_router
 
 _DESCRIPTION = (
     "Designs and runs multi-camera rigs that photograph a face. Lengths are in millimetres, angles "
     "in degrees, times in UTC. Errors are problem details (RFC 9457)."
 )
+
+_ASKED_WITH = ("Content-Type", "X-Rigwright", "Idempotency-Key", "Last-Event-ID", "If-None-Match")
 
 
 def make_app() -> FastAPI:
@@ -55,9 +60,10 @@ def make_app() -> FastAPI:
         redoc_url=None,
         # A redirect would name the host that was asked for.
         redirect_slashes=False,
+        generate_unique_id_function=lambda route: route.name,
     )
     resources = (
-        *(root, scans, examples, designs, exports, plans, evaluations),
+        *(root, health, metrics, scans, examples, designs, exports, plans, evaluations),
         *(rigs, captures, rigtests, sessions),
         *(targetsets, picturesets, calibrations, checks, acceptances),
     )
@@ -66,7 +72,7 @@ def make_app() -> FastAPI:
         app.include_router(router)
     app.include_router(page_router)
     install_error_handlers(app)
-    app.openapi = lambda: _openapi(app)  # type: ignore[method-assign]
+    app.openapi = lambda: document.openapi(app)  # type: ignore[method-assign]
     return app
 
 
@@ -75,10 +81,22 @@ def create_app(service: Service) -> FastAPI:
     app = make_app()
     app.state.service = service
     settings = service.settings
+    app.state.requests = metrics.RequestCounts()
     # The last that is added is the first that a request meets.
+    app.add_middleware(Conditional)
     app.add_middleware(BodyLimits, stopping=service.stopping.is_set, pause_s=PAUSE_S)
+    if settings.allowed_origins:
+        app.add_middleware(
+            CORSMiddleware,
+            allow_origins=settings.allowed_origins,
+            allow_methods=("GET", "POST", "DELETE"),
+            allow_headers=_ASKED_WITH,
+            expose_headers=("Location", "ETag", "X-Request-ID"),
+        )
     app.add_middleware(Gate, hosts=settings.known_hosts, origins=settings.allowed_origins)
-    app.add_middleware(RequestLog)
+    app.add_middleware(RequestLog, stopping=service.stopping.is_set)
+    app.add_middleware(metrics.CountedRequests, counts=app.state.requests)
+    app.add_middleware(Prefix, prefix=settings.root_path)
     return app
 
 
@@ -88,39 +106,3 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     service.start()
     yield
     await to_thread.run_sync(service.stop)
-
-
-def _openapi(app: FastAPI) -> dict[str, Any]:
-    if app.openapi_schema is None:
-        document = get_openapi(
-            title=app.title, version=app.version, description=app.description, routes=app.routes
-        )
-        schemas = document.setdefault("components", {}).setdefault("schemas", {})
-        problem = Problem.model_json_schema(ref_template="#/components/schemas/{model}")
-        schemas.update(problem.pop("$defs", {}))
-        schemas["Problem"] = problem
-        _drop_the_framework_errors(document)
-        _add_the_answers_of_the_gate(document)
-        document["components"]["schemas"] = dict(sorted(schemas.items()))
-        app.openapi_schema = document
-    return app.openapi_schema
-
-
-def _add_the_answers_of_the_gate(document: dict[str, Any]) -> None:
-    for path in document["paths"].values():
-        for method, operation in path.items():
-            statuses = (403, 408, 413, 415, 421, 503) if method != "get" else (421, 503)
-            for status, answer in problems(*statuses).items():
-                operation["responses"].setdefault(str(status), answer)
-
-
-def _drop_the_framework_errors(document: dict[str, Any]) -> None:
-    # FastAPI adds its own error shape to every operation with a parameter that does not declare
-    # 422; ours are declared where they can occur.
-    for path in document["paths"].values():
-        for operation in path.values():
-            unprocessable = operation["responses"].get("422", {})
-            if "application/json" in unprocessable.get("content", {}):
-                del operation["responses"]["422"]
-    for name in ("HTTPValidationError", "ValidationError"):
-        document["components"]["schemas"].pop(name, None)

@@ -84,7 +84,7 @@ def _targets(service: ServiceDep, body: CheckBody) -> JobInput:
     responses=problems(404, 409, 422)
     | {200: {"description": "A page.", "content": {"text/html": {}}}},
 )
-def read_history(service: ServiceDep, job_id: str) -> HTMLResponse:
+def read_calibration_history(service: ServiceDep, job_id: str) -> HTMLResponse:
     """Read how a rig has drifted: a page with all checks against a calibration."""
     completed(service, job_id, calibrations.kind.name)
     checks = []

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from fastapi import APIRouter, Response
 
+from service.api.addresses import at
 from service.api.calibrations import resource as calibrations
 from service.api.context import ServiceDep
 from service.api.designs import resource as designs
@@ -38,7 +39,7 @@ class ExportList(Model):
 
 
 @router.get(designs.path + "/{job_id}/exports", response_model=ExportList, responses=problems(404))
-def list_exports(service: ServiceDep, job_id: str) -> ExportList:
+def list_design_exports(service: ServiceDep, job_id: str) -> ExportList:
     """List the programs a design's cameras can be written for."""
     service.store.jobs.get(job_id, designs.kind.name)
     return _formats(f"{designs.path}/{job_id}/exports")
@@ -60,7 +61,7 @@ def _formats(path: str) -> ExportList:
                 name=form.name,
                 program=form.program,
                 description=form.description,
-                href=f"{path}/{form.name}",
+                href=at(f"{path}/{form.name}"),
             )
             for form in export_formats()
         ]
@@ -72,7 +73,7 @@ def _formats(path: str) -> ExportList:
     response_class=Response,
     responses=problems(404, 409, 503) | ZIP,
 )
-def read_export(service: ServiceDep, job_id: str, form: str) -> Response:
+def read_design_export(service: ServiceDep, job_id: str, form: str) -> Response:
     """Fetch a design's cameras as one program wants them, in a ZIP archive."""
     design = designs.file(service, job_id, "design.json")
     return zipped(exported(form, designed_cameras(Path(design.path))), f"{form}.zip")

@@ -18,6 +18,7 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from common.errors import InputError
+from service.api.addresses import own_path
 from service.api.errors import answer
 
 HEADER = "x-rigwright"
@@ -67,7 +68,7 @@ class Gate:
                 _protect(MutableHeaders(scope=message))
             await send(message)
 
-        refusal = self._refusal(scope["method"], scope["path"], Headers(scope=scope))
+        refusal = self._refusal(scope["method"], own_path(scope), Headers(scope=scope))
         if refusal is not None:
             await answer(refusal)(scope, receive, send_protected)
             return

@@ -4,14 +4,16 @@
 from collections.abc import AsyncIterator, Callable
 from datetime import datetime
 from typing import Annotated, Generic
+from urllib.parse import quote
 
 from anyio import to_thread
-from fastapi import APIRouter, Depends
-from fastapi.responses import FileResponse
+from fastapi import APIRouter, Depends, Response
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 from pydantic import BaseModel
 
 from common.errors import ConflictError, NotFoundError
+from service.api.addresses import at
+from service.api.conditional import StoredFile
 from service.api.context import Service, ServiceDep
 from service.api.models import (
     Cursor,
@@ -24,7 +26,7 @@ from service.api.models import (
     Problem,
     problems,
 )
-from service.api.responses import Responses
+from service.api.responses import a_file
 from service.kinds.base import JobKind, RequestT, ResultT
 from service.problems import stored_problem
 from service.store.jobrecords import JobEvent, JobRecord
@@ -49,13 +51,15 @@ class JobResource(Generic[RequestT, ResultT]):
     ) -> None:
         self.kind = kind
         self.path = f"/v1/{plural}"
+        self._one = kind.name.replace("-", "_")
+        self._all = plural.replace("-", "_")
         self._model = model
         self._page = page
         self._with_files = with_files
 
     def location(self, job: JobRecord) -> str:
-        """The path of a job."""
-        return f"{self.path}/{job.id}"
+        """The address of a job."""
+        return at(f"{self.path}/{job.id}")
 
     def document(self, job: JobRecord) -> Job[ResultT]:
         """A job as it goes over HTTP."""
@@ -85,7 +89,12 @@ class JobResource(Generic[RequestT, ResultT]):
             self._add_files(router)
 
     def _add_reading(self, router: APIRouter) -> None:
-        @router.get(self.path, response_model=self._page, responses=problems(422))
+        @router.get(
+            self.path,
+            name=f"list_{self._all}",
+            response_model=self._page,
+            responses=problems(422),
+        )
         def list_jobs(service: ServiceDep, limit: Limit = 50, cursor: Cursor = None) -> BaseModel:
             """List jobs, newest first."""
             found = service.store.jobs.page(self.kind.name, limit + 1, cursor)
@@ -97,7 +106,12 @@ class JobResource(Generic[RequestT, ResultT]):
                 }
             )
 
-        @router.get(self.path + "/{job_id}", response_model=self._model, responses=problems(404))
+        @router.get(
+            self.path + "/{job_id}",
+            name=f"read_{self._one}",
+            response_model=self._model,
+            responses=problems(404),
+        )
         def read_job(service: ServiceDep, job_id: str) -> Job[ResultT]:
             """Read the status, progress and result of a job."""
             return self.document(service.store.jobs.get(job_id, self.kind.name))
@@ -108,6 +122,7 @@ class JobResource(Generic[RequestT, ResultT]):
 
         @router.get(
             self.path + "/{job_id}/events",
+            name=f"follow_{self._one}",
             response_class=EventSourceResponse,
             responses=problems(404, 422),
         )
@@ -127,21 +142,34 @@ class JobResource(Generic[RequestT, ResultT]):
     def _add_changing(self, router: APIRouter) -> None:
         @router.post(
             self.path + "/{job_id}/cancel",
+            name=f"cancel_{self._one}",
             status_code=202,
             response_model=self._model,
             responses=problems(404, 409),
         )
-        def cancel_job(service: ServiceDep, job_id: str) -> Job[ResultT]:
+        def cancel_job(service: ServiceDep, job_id: str, response: Response) -> Job[ResultT]:
             """Ask a job to stop. Asking again changes nothing; once it has ended: 409."""
-            return self.document(service.cancels.cancel(job_id, self.kind.name))
+            job = service.cancels.cancel(job_id, self.kind.name)
+            response.headers["Location"] = self.location(job)
+            return self.document(job)
 
-        @router.delete(self.path + "/{job_id}", status_code=204, responses=problems(404, 409))
+        @router.delete(
+            self.path + "/{job_id}",
+            name=f"remove_{self._one}",
+            status_code=204,
+            responses=problems(404, 409),
+        )
         def remove_job(service: ServiceDep, job_id: str) -> None:
             """Remove a job that has ended, with its files."""
             service.store.jobs.remove(job_id, self.kind.name)
 
     def _add_files(self, router: APIRouter) -> None:
-        @router.get(self.path + "/{job_id}/files", response_model=FileList, responses=problems(404))
+        @router.get(
+            self.path + "/{job_id}/files",
+            name=f"list_{self._one}_files",
+            response_model=FileList,
+            responses=problems(404),
+        )
         def list_files(service: ServiceDep, job_id: str) -> FileList:
             """List the files a job made; none until it is completed."""
             service.store.jobs.get(job_id, self.kind.name)
@@ -151,7 +179,7 @@ class JobResource(Generic[RequestT, ResultT]):
                     media_type=file.media_type,
                     size_bytes=file.size_bytes,
                     sha256=file.sha256,
-                    href=f"{self.path}/{job_id}/files/{file.name}",
+                    href=at(f"{self.path}/{job_id}/files/{quote(file.name)}"),
                 )
                 for file in service.store.jobs.files(job_id)
             ]
@@ -159,49 +187,40 @@ class JobResource(Generic[RequestT, ResultT]):
 
         @router.get(
             self.path + "/{job_id}/files/{name:path}",
-            response_class=FileResponse,
-            responses=problems(404, 409) | _any_file("application/octet-stream"),
+            name=f"read_{self._one}_file",
+            response_class=StoredFile,
+            responses=problems(404, 409) | a_file("application/octet-stream"),
         )
-        def read_file(service: ServiceDep, job_id: str, name: str) -> FileResponse:
+        def read_file(service: ServiceDep, job_id: str, name: str) -> StoredFile:
             """Fetch one file by its name in the list."""
             return self.file(service, job_id, name)
 
     def add_shortcut(self, router: APIRouter, word: str, file_name: str, media_type: str) -> None:
         """Give a file a path of its own, ``/{job_id}/<word>``."""
 
-        def read_shortcut(service: ServiceDep, job_id: str) -> FileResponse:
+        def read_shortcut(service: ServiceDep, job_id: str) -> StoredFile:
             return self.file(service, job_id, file_name)
 
         read_shortcut.__doc__ = f"Fetch {file_name}."
-        endpoint: Callable[..., FileResponse] = read_shortcut
+        endpoint: Callable[..., StoredFile] = read_shortcut
         router.get(
             f"{self.path}/{{job_id}}/{word}",
-            name=f"read_{word}",
-            response_class=FileResponse,
-            responses=problems(404, 409) | _any_file(media_type),
+            name=f"read_{self._one}_{word}",
+            response_class=StoredFile,
+            responses=problems(404, 409) | a_file(media_type, f"{file_name}."),
         )(endpoint)
 
-    def file(self, service: Service, job_id: str, name: str) -> FileResponse:
+    def file(self, service: Service, job_id: str, name: str) -> StoredFile:
         """One file of a job. The name is looked up among the job's files, never used as a path."""
         job = service.store.jobs.get(job_id, self.kind.name)
         if not job.status.terminal:
             raise ConflictError("job-active", "the job has not ended", "wait until it is completed")
         for file in service.store.jobs.files(job_id):
             if file.name == name and file.path.exists():
-                return FileResponse(file.path, media_type=file.media_type)
+                return StoredFile(file.path, file.media_type, file.sha256)
         raise NotFoundError(
             "file", f"the {job.status} job has no file {name!r}", f"see {self.path}/{job_id}/files"
         )
-
-
-def _any_file(media_type: str) -> Responses:
-    schema = {"type": "string", "format": "binary"}
-    content = (
-        {"application/json": {}}
-        if media_type == "application/json"
-        else {media_type: {"schema": schema}}
-    )
-    return {200: {"description": "The file.", "content": content}}
 
 
 async def _events(service: Service, job_id: str, last: int) -> AsyncIterator[ServerSentEvent]:

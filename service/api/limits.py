@@ -10,6 +10,7 @@ from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from common.errors import InputError, InternalError, TooLargeError
+from service.api.addresses import own_path
 from service.api.errors import Refusal, answer
 from service.api.gate import UPLOADS
 
@@ -46,7 +47,7 @@ class BodyLimits:
         if self._stopping():
             await answer(_stops())(scope, receive, send)
             return
-        limit = None if scope["path"] in UPLOADS else LARGEST_BODY_BYTES
+        limit = None if own_path(scope) in UPLOADS else LARGEST_BODY_BYTES
         announced = Headers(scope=scope).get("content-length", "")
         if limit is not None and announced.isdecimal() and int(announced) > limit:
             await answer(_too_large(limit))(scope, receive, send)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import asyncio
 import re
 import secrets
 import time
+from collections.abc import Callable
 
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -17,8 +19,9 @@ _SOUND_ID = re.compile(r"[A-Za-z0-9._-]{1,64}")
 class RequestLog:
     """ASGI middleware. A sound ``X-Request-ID`` of the client is kept, else one is made."""
 
-    def __init__(self, app: ASGIApp) -> None:
+    def __init__(self, app: ASGIApp, stopping: Callable[[], bool]) -> None:
         self._app = app
+        self._stopping = stopping
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Handle one request."""
@@ -40,6 +43,11 @@ class RequestLog:
         token = request_id.set(own)
         try:
             await self._app(scope, receive, send_marked)
+        except asyncio.CancelledError:
+            # A client that does not take its answer is left when the service stops; the server
+            # would write that down as a fault of the program.
+            if not self._stopping():
+                raise
         finally:
             fields = {
                 "method": scope["method"],

@@ -10,6 +10,7 @@ from fastapi import APIRouter, Query, Request, Response
 from pydantic import AwareDatetime, Field
 
 from common.errors import InputError, InternalError
+from service.api.addresses import at
 from service.api.context import Service, ServiceDep
 from service.api.models import Cursor, Limit, problems
 from service.api.receiving import died, read_apart, receive
@@ -54,7 +55,7 @@ def _document(record: DocumentRecord) -> PictureSet:
         created_at=record.created_at,  # type: ignore[arg-type]
         cameras=facts.cameras,
         frames=facts.frames,
-        links={"self": f"{PATH}/{record.id}"},
+        links={"self": at(f"{PATH}/{record.id}")},
     )
 
 
@@ -101,7 +102,7 @@ async def add_picture_set(
             _read_and_keep, service, staged, filename, limiter=service.imports
         )
     response.status_code = 201 if new else 200
-    response.headers["Location"] = f"{PATH}/{record.id}"
+    response.headers["Location"] = at(f"{PATH}/{record.id}")
     return _document(record)
 
 

@@ -10,7 +10,7 @@ from service.api.job_routes import JobResource
 from service.api.measuring import completed, made_file
 from service.api.models import IdempotencyKeyHeader, Job, problems
 from service.api.submission import Submission, asked, submit
-from service.api.zipped import ZIP, zipped
+from service.api.zipped import ZIP, streamed
 from service.kinds.base import Id, Model
 from service.kinds.plan import PLAN, PlanRequest, PlanResult
 
@@ -61,11 +61,11 @@ def add_plan(
 @router.get(
     resource.path + "/{job_id}/archive", response_class=Response, responses=problems(404, 409) | ZIP
 )
-def read_archive(service: ServiceDep, job_id: str) -> Response:
+def read_plan_archive(service: ServiceDep, job_id: str) -> Response:
     """Fetch all files of a plan in one ZIP archive."""
     completed(service, job_id, resource.kind.name)
-    files = {file.name: file.path.read_bytes() for file in service.store.jobs.files(job_id)}
-    return zipped(files, "plan.zip")
+    files = [(file.name, file.path) for file in service.store.jobs.files(job_id)]
+    return streamed(files, "plan.zip", pictures=False)
 
 
 resource.add_to(router)

@@ -6,6 +6,7 @@ from urllib.parse import quote
 
 from fastapi import APIRouter
 
+from service.api.addresses import at
 from service.api.context import ServiceDep
 from service.api.models import Problem, problems
 from service.api.rigmodels import RigList, RigStatus
@@ -19,8 +20,8 @@ _PLURALS = {CAPTURE.name: "captures", RIG_TEST.name: "rig-tests"}
 
 
 def rig_path(name: str) -> str:
-    """The path of a rig."""
-    return f"/v1/rigs/{quote(name, safe='')}"
+    """The address of a rig."""
+    return at(f"/v1/rigs/{quote(name, safe='')}")
 
 
 @router.get("/v1/rigs", response_model=RigList)
@@ -59,7 +60,7 @@ def _document(worker: StationWorker) -> RigStatus:
     return RigStatus(
         name=worker.name,
         status=rig_state(health, doing is not None, problem),
-        doing=None if doing is None else f"/v1/{_PLURALS[doing.kind]}/{doing.id}",
+        doing=None if doing is None else at(f"/v1/{_PLURALS[doing.kind]}/{doing.id}"),
         problem=None if problem is None else Problem.model_validate(problem_document(problem)),
         trigger=trigger_status(health),
         cameras=camera_statuses(worker.station, health),

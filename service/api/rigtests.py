@@ -38,7 +38,7 @@ resource = JobResource(RIG_TEST, "rig-tests", RigTestJob, RigTestPage, with_file
     response_model=RigTestJob,
     responses=problems(400, 404, 409, 413, 422, 423, 503, 507),
 )
-def add_test(
+def add_rig_test(
     request: RigTestRequest, response: Response, service: ServiceDep, rig: str
 ) -> Job[RigTestOutcome]:
     """Test a rig, now. 409 while it is busy, 503 when it is not open."""

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Query, Request, Response
 from pydantic import AwareDatetime, Field
 
+from service.api.addresses import at
 from service.api.context import ServiceDep
 from service.api.models import Cursor, IdempotencyKeyHeader, Limit, problems
 from service.api.uploads import Upload, take_in
@@ -51,7 +52,7 @@ def _document(record: ScanRecord) -> Scan:
             "size_bytes": record.size_bytes,
             "created_at": record.created_at,
             **record.report,
-            "links": {"self": f"/v1/scans/{record.id}"},
+            "links": {"self": at(f"/v1/scans/{record.id}")},
         }
     )
 
@@ -109,7 +110,7 @@ async def add_scan(
     upload = Upload.announced(request, filename, given, idempotency_key)
     record, new = await take_in(service, request, upload)
     response.status_code = 201 if new else 200
-    response.headers["Location"] = f"/v1/scans/{record.id}"
+    response.headers["Location"] = at(f"/v1/scans/{record.id}")
     return _document(record)
 
 

@@ -2,14 +2,26 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter
-from fastapi.responses import FileResponse
+from urllib.parse import quote
 
+from fastapi import APIRouter
+from fastapi.responses import StreamingResponse
+
+from service.api.addresses import at
+from service.api.conditional import StoredFile
 from service.api.context import ServiceDep
 from service.api.models import problems
+from service.api.responses import a_file
+from service.api.zipped import ZIP, streamed
 from service.kinds.base import Model
 from service.kinds.sessions import CaptureRecord, SessionFile, SessionProof
-from service.stations.filed import capture_record, filed_file, session_manifest, session_proof
+from service.stations.filed import (
+    capture_record,
+    filed_at_once,
+    filed_file,
+    session_manifest,
+    session_proof,
+)
 
 router = APIRouter(tags=["sessions"])
 
@@ -53,23 +65,37 @@ def read_session_capture(service: ServiceDep, session: str, capture_id: str) -> 
 @router.post(
     "/v1/sessions/{session}/verify", response_model=SessionProof, responses=problems(404, 422)
 )
-def verify(service: ServiceDep, session: str) -> SessionProof:
+def verify_session_files(service: ServiceDep, session: str) -> SessionProof:
     """Prove a session whole, file by file. Takes as long as reading all of it."""
     return session_proof(service.rigs.session_folder(session))
 
 
 @router.get(
     "/v1/sessions/{session}/files/{path:path}",
-    response_class=FileResponse,
-    responses=problems(404, 422)
-    | {200: {"description": "The file.", "content": {"application/octet-stream": {}}}},
+    response_class=StoredFile,
+    responses=problems(404, 422) | a_file("application/octet-stream"),
 )
-def read_session_file(service: ServiceDep, session: str, path: str) -> FileResponse:
+def read_session_file(service: ServiceDep, session: str, path: str) -> StoredFile:
     """Fetch a picture or another file by the path that the session's records give it."""
     file = filed_file(service.rigs.session_folder(session), path)
-    return FileResponse(file.path, media_type=file.media_type)
+    return StoredFile(file.path, file.media_type, file.sha256)
+
+
+@router.get(
+    "/v1/sessions/{session}/archive",
+    response_class=StreamingResponse,
+    responses=problems(404, 409, 422) | ZIP,
+)
+def read_session_archive(service: ServiceDep, session: str) -> StreamingResponse:
+    """Fetch all that is committed of a session in one ZIP archive, which is a session again.
+
+    It is made as it is sent, and its length is told before.
+    """
+    filed = filed_at_once(service.rigs.session_folder(session))
+    files = [(f"{session}/{path}", content) for path, content in filed]
+    return streamed(files, f"{session}.zip", pictures=True)
 
 
 def _links(name: str) -> dict[str, str]:
-    own = f"/v1/sessions/{name}"
-    return {"self": own, "files": f"{own}/files", "verify": f"{own}/verify"}
+    own = at(f"/v1/sessions/{quote(name)}")
+    return {"self": own} | {word: f"{own}/{word}" for word in ("files", "verify", "archive")}

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from pathlib import Path
 from typing import Annotated
+from urllib.parse import quote
 
 from fastapi import APIRouter, Query, Response
 from pydantic import AwareDatetime, Field
 
 from common.errors import NotFoundError
+from service.api.addresses import at
 from service.api.context import Service, ServiceDep
 from service.api.designs import resource as designs
 from service.api.models import Cursor, Limit, problems
+from service.api.responses import a_file
 from service.kinds.base import Id, Model
 from service.kinds.defaults import PAGE
 from service.kinds.targets import SeenByCamera, TargetsModel
@@ -79,7 +82,7 @@ class SheetList(Model):
 
 
 def _document(record: DocumentRecord) -> TargetSet:
-    own = f"{PATH}/{record.id}"
+    own = at(f"{PATH}/{record.id}")
     return TargetSet(
         id=record.id,
         name=record.report["name"],
@@ -109,7 +112,7 @@ def add_target_set(request: TargetsModel, response: Response, service: ServiceDe
     """Add a target set: the structure of a target file, as JSON."""
     record, new = keep_targets(service, given_targets(request))
     response.status_code = 201 if new else 200
-    response.headers["Location"] = f"{PATH}/{record.id}"
+    response.headers["Location"] = at(f"{PATH}/{record.id}")
     return _document(record)
 
 
@@ -119,11 +122,13 @@ def add_target_set(request: TargetsModel, response: Response, service: ServiceDe
     response_model=ProposedTargets,
     responses=problems(400, 404, 409, 413, 422, 507),
 )
-def propose(request: ProposalRequest, response: Response, service: ServiceDep) -> ProposedTargets:
+def propose_target_set(
+    request: ProposalRequest, response: Response, service: ServiceDep
+) -> ProposedTargets:
     """Add a target set that suits a design: sizes, numbers and places for its cameras."""
     proposal = proposed_targets(Path(designs.file(service, request.design_id, "design.json").path))
     record, _ = keep_targets(service, proposal.targets)
-    response.headers["Location"] = f"{PATH}/{record.id}"
+    response.headers["Location"] = at(f"{PATH}/{record.id}")
     return ProposedTargets(
         target_set=_document(record),
         cameras=list(proposal.cameras),
@@ -153,8 +158,7 @@ def read_target_set(service: ServiceDep, target_set_id: str) -> TargetSet:
 @router.get(
     PATH + "/{target_set_id}/file",
     response_class=Response,
-    responses=problems(404)
-    | {200: {"description": "The target file.", "content": {"application/toml": {}}}},
+    responses=problems(404) | a_file("application/toml", "The target file."),
 )
 def read_target_file(service: ServiceDep, target_set_id: str) -> Response:
     """Fetch a target set as a target file (TOML)."""
@@ -173,7 +177,7 @@ def list_sheets(service: ServiceDep, target_set_id: str, page: Page = PAGE) -> S
             name=sheet.name,
             carrier=sheet.carrier,
             media_type=sheet.media_type,
-            href=f"{PATH}/{target_set_id}/sheets/{sheet.name}",
+            href=at(f"{PATH}/{target_set_id}/sheets/{quote(sheet.name)}"),
         )
         for sheet in sheets_of_file(_targets(service, target_set_id), page).values()
     ]
@@ -183,8 +187,7 @@ def list_sheets(service: ServiceDep, target_set_id: str, page: Page = PAGE) -> S
 @router.get(
     PATH + "/{target_set_id}/sheets/{name}",
     response_class=Response,
-    responses=problems(404, 422)
-    | {200: {"description": "The file.", "content": {"application/pdf": {}}}},
+    responses=problems(404, 422) | a_file("application/pdf"),
 )
 def read_sheet(service: ServiceDep, target_set_id: str, name: str, page: Page = PAGE) -> Response:
     """Fetch a sheet to print (PDF, SVG), or a picture of a carrier for simulations (PNG)."""

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from common.errors import NotFoundError
 from rig.acquisition.session.index import read_index
+from rig.acquisition.session.moment import settled
 from rig.acquisition.session.storage import Disk
 from rig.acquisition.session.verify import verify_session
 from service.kinds.sessions import CaptureRecord, FindingLine, SessionFile, SessionProof
@@ -18,6 +19,7 @@ class FiledFile:
 
     path: Path
     media_type: str | None
+    sha256: str
 
 
 def session_manifest(folder: Path) -> SessionFile:
@@ -52,14 +54,18 @@ def session_proof(folder: Path) -> SessionProof:
 def filed_file(folder: Path, path: str) -> FiledFile:
     """The file that the session's records name ``path``. Raises :class:`NotFoundError`."""
     index = read_index(folder, Disk())
-    known = {entry.path for entry in (*index.manifest.rig, *index.manifest.tables)}
-    known |= {capture.record.path for capture in index.manifest.captures}
+    known = {entry.path: entry.sha256 for entry in index.files()}
     types = {frame.file.path: frame.media_type for r in index.records for frame in r.frames}
     # Looked up among what the session lists: what is asked for is never used as a path.
-    if path not in known | types.keys() or not (folder / path).is_file():
+    if path not in known or not (folder / path).is_file():
         raise NotFoundError(
             "session-file",
             f"session {folder.name!r} has no file {path!r}",
             f"see /v1/sessions/{folder.name}",
         )
-    return FiledFile(folder / path, types.get(path))
+    return FiledFile(folder / path, types.get(path), known[path])
+
+
+def filed_at_once(folder: Path) -> list[tuple[str, Path | bytes]]:
+    """All files of a session as it stood at one moment, by path; raises as :func:`settled`."""
+    return settled(folder)

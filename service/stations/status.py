@@ -9,8 +9,10 @@ from common.files.plain import plain
 from rig.acquisition.cameras.base import CameraHealth
 from rig.acquisition.capture.results import RigHealth
 from rig.acquisition.station.spec import CameraPlan, Station
+from rig.acquisition.trigger.box import TriggerState
 from service.kinds.base import Figure, Model
 
+_ABLE = (TriggerState.READY, TriggerState.ARMED, TriggerState.FIRING)
 State = Literal["ready", "busy", "degraded", "closed"]
 
 
@@ -69,6 +71,27 @@ def rig_state(health: RigHealth | None, busy: bool, problem: RigwrightError | No
             well and health.box.state.value == "ready" and health.box.interlock_closed is not False
         )
     return "ready" if well else "degraded"
+
+
+def device_faults(health: RigHealth) -> list[str]:
+    """What keeps an open rig from taking a capture, box and each camera in a sentence."""
+    wrong = []
+    box = health.box
+    if box is not None and box.interlock_closed is False:
+        wrong.append("the interlock is open")
+    if box is not None and not box_is_able(health):
+        wrong.append(f"trigger box: {box.last_problem or box.state.value}")
+    wrong += [
+        f"camera {name}: {camera.problem or 'not connected'}"
+        for name, camera in health.cameras.items()
+        if not camera.connected
+    ]
+    return wrong
+
+
+def box_is_able(health: RigHealth) -> bool | None:
+    """Whether the box is there and in no fault; None where the station has none."""
+    return None if health.box is None else health.box.state in _ABLE
 
 
 def _camera(plan: CameraPlan, health: CameraHealth | None) -> CameraStatus:

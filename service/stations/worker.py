@@ -44,7 +44,7 @@ class StationWork:
 _REOPEN_S = 5.0
 """How often devices are looked for that were not there: somebody plugs them in sooner or later."""
 
-GONE = (TriggerState.DISCONNECTED, TriggerState.OPENING, TriggerState.PROBING)
+_GONE = (TriggerState.DISCONNECTED, TriggerState.OPENING, TriggerState.PROBING)
 
 
 @dataclass(frozen=True)
@@ -151,7 +151,7 @@ class StationWorker:
         box = self._rig.health().box
         if box is None or kind is RIG_TEST:
             return
-        if box.state in GONE:
+        if box.state in _GONE:
             raise DeviceError(
                 "trigger-gone",
                 f"the trigger box of rig {self.name!r} does not answer "

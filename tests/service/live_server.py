@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 import sys
 from pathlib import Path
 
 import counting_job
 from counting_job import COUNT, Counted, CountRequest
 from fastapi import APIRouter, FastAPI, Response
+from fastapi.responses import StreamingResponse
 
 from service.api.app import create_app
 from service.api.context import Service, ServiceDep
@@ -49,6 +51,11 @@ def add_count(
     service.jobs.wake()
     response.headers["Location"] = resource.location(record)
     return resource.document(record)
+
+
+@router.get("/v1/counts/endless")
+def count_for_ever() -> StreamingResponse:
+    return StreamingResponse(itertools.repeat(b"0" * (1 << 16)), media_type="text/plain")
 
 
 resource.add_to(router)

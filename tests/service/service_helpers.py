@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 from typing import TypeVar
 
@@ -20,10 +23,15 @@ from typer.testing import CliRunner
 
 from common.progress import CancelToken, ProgressCallback
 from rig.specification.examples import example_text
-from service.cli import app, running
+from service.api.app import create_app
+from service.api.context import Service
+from service.cli import app
+from service.cli import running as running_tasks
 from service.ipc import TaskMessage, message_from_line, outcome_line, task_line
 from service.jobs.engine import Running, Task
 from service.kinds.base import RequestT, ResultT
+from service.kinds.queued import QUEUED
+from service.settings import read_settings
 from service.store import Store
 from service.store.jobrecords import JobRecord
 from service.tasks.registry import work_of
@@ -52,6 +60,18 @@ class TestClient(StarletteClient):
             headers=MARKED,
             raise_server_exceptions=raise_server_exceptions,
         )
+
+
+@contextmanager
+def running(data: Path, station: Path, **settings: object) -> Iterator[TestClient]:
+    """A service with the rig ``studio`` that a station file tells of."""
+    service = Service(read_settings(data_dir=data, stations=[station], **settings), QUEUED)
+    try:
+        with TestClient(create_app(service), raise_server_exceptions=False) as client:
+            wait_for(lambda: client.get("/v1/rigs/studio").json()["status"] != "closed")
+            yield client
+    finally:
+        service.close()
 
 
 def wait_for(condition: Callable[[], T | None], seconds: float = 30.0) -> T:
@@ -96,7 +116,7 @@ def rigwright_here(*arguments: object, cwd: Path) -> subprocess.CompletedProcess
     """The command, its task too, in this process: loading everything anew takes two seconds."""
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(cwd)
-        patch.setattr(running, "ProcessEngine", InThisProcess)
+        patch.setattr(running_tasks, "ProcessEngine", InThisProcess)
         done = CliRunner().invoke(app, [str(argument) for argument in arguments])
     if done.exception is not None and not isinstance(done.exception, SystemExit):
         raise done.exception
@@ -148,7 +168,19 @@ class LiveServer:
 
     def stop(self) -> int:
         self.process.send_signal(signal.SIGTERM)
-        return self.process.wait(20.0)
+        return self.process.wait(60.0)
+
+    def stop_took_s(self) -> float:
+        """Stop it; from hearing of it to the last line of its log.
+
+        How long the interpreter takes to go depends on who else works on this machine.
+        """
+        assert self.stop() == 0
+        lines = [json.loads(line) for line in self.log.read_text().splitlines()]
+        (began,) = [line["at"] for line in lines if line["message"] == "Shutting down"]
+        return (
+            datetime.fromisoformat(lines[-1]["at"]) - datetime.fromisoformat(began)
+        ).total_seconds()
 
 
 StartServer = Callable[..., LiveServer]

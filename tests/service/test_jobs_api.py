@@ -89,6 +89,7 @@ def test_cancel_twice_then_too_late_then_remove(client: TestClient) -> None:
         answer = client.post(f"{location}/cancel")
         if answer.status_code != 409:  # the second may come when it is over already
             assert (answer.status_code, answer.json()["cancel_requested"]) == (202, True)
+            assert answer.headers["Location"] == location
     assert finished(client, location)["status"] == "cancelled"
     assert time.monotonic() - began < 1.0
     answer = client.post(f"{location}/cancel")

@@ -9,11 +9,14 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import jsonschema
 import pytest
 from service_helpers import ROOT, StartServer
 
 from rig.specification.sections.subject import ScanSection
 from service.api.app import make_app
+from service.api.document import EVENTS
+from service.kinds.examples import body_examples
 
 DOCUMENT: dict[str, Any] = make_app().openapi()
 # Event streams have no end to wait for.
@@ -93,5 +96,55 @@ def test_a_scan_is_read_with_the_words_of_a_rig_file() -> None:
 def test_every_operation_and_field_is_explained() -> None:
     for path, method, operation in operations():
         assert operation.get("description"), (path, method)
+
+
+def test_a_generated_client_has_a_plain_name_for_everything() -> None:
     names = [operation["operationId"] for _, _, operation in operations()]
     assert len(set(names)) == len(names)
+    for name in names:
+        assert name.isidentifier() and "v1" not in name
+
+
+def test_every_answer_says_what_it_is_and_where_what_was_made_is() -> None:
+    for path, _, operation in operations():
+        for status, answer in operation["responses"].items():
+            if status in ("200", "201", "202"):
+                assert answer["content"], path
+                assert all(form.get("schema") for form in answer["content"].values()), path
+            if status in ("201", "202"):
+                assert answer["headers"]["Location"]["schema"]["format"] == "uri-reference"
+
+
+def test_from_what_was_made_links_lead_to_what_can_be_done_with_it() -> None:
+    known = {operation["operationId"] for _, _, operation in operations()}
+    made = [o["responses"]["201"] for _, _, o in operations() if "201" in o["responses"]]
+    links = [answer["links"] for answer in made if "links" in answer]
+    assert len(links) >= 10  # jobs, scans, sets of pictures and targets
+    for link in links:
+        assert {one["operationId"] for one in link.values()} <= known
+        assert "self" in link
+    design = DOCUMENT["paths"]["/v1/designs"]["post"]["responses"]["201"]["links"]
+    assert design["events"] == {
+        "operationId": "follow_design",
+        "parameters": {"job_id": "$response.body#/id"},
+    }
+
+
+def test_the_examples_fit_their_schemas() -> None:
+    shown = 0
+    for _, method, operation in operations():
+        content = operation.get("requestBody", {}).get("content", {}).get("application/json")
+        if method != "post" or content is None:
+            continue
+        shown += 1
+        schema = {**content["schema"], "components": DOCUMENT["components"]}
+        jsonschema.Draft202012Validator(schema).validate(content["example"])
+    assert shown == len(body_examples())
+
+
+def test_streams_name_their_events() -> None:
+    followed = [o for path, _, o in operations() if path.endswith("/events")]
+    assert len(followed) == 8
+    for operation in followed:
+        events = operation["responses"]["200"]["content"]["text/event-stream"]["itemSchema"]
+        assert events["properties"]["event"]["enum"] == list(EVENTS)

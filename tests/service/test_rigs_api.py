@@ -7,13 +7,12 @@ import json
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import pytest
 from PIL import Image
-from service_helpers import TestClient, wait_for
+from service_helpers import TestClient, running, wait_for
 from stations import write_station
 
 from rig.acquisition.station.stationfile import read_station
@@ -30,18 +29,6 @@ from service.store.jobs import Jobs
 
 JSON = dict[str, Any]
 ENDED = {"completed", "failed", "cancelled", "interrupted"}
-
-
-@contextmanager
-def running(data: Path, station: Path) -> Iterator[TestClient]:
-    settings = read_settings(data_dir=data, stations=[station])
-    service = Service(settings, QUEUED)
-    try:
-        with TestClient(create_app(service), raise_server_exceptions=False) as client:
-            wait_for(lambda: client.get("/v1/rigs/studio").json()["status"] != "closed")
-            yield client
-    finally:
-        service.close()
 
 
 @pytest.fixture

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -32,6 +33,14 @@ class SessionIndex:
         """The entry of a capture that was begun and not committed."""
         found = (e for e in self.manifest.interrupted if e.capture_id == capture_id)
         return next(found, None)
+
+    def files(self) -> Iterator[FileEntry]:
+        """Every file the session knows, ``session.json`` itself aside."""
+        yield from self.manifest.rig
+        yield from self.manifest.tables
+        yield from (listed.record for listed in self.manifest.captures)
+        for record in self.records:
+            yield from (frame.file for frame in record.frames)
 
     @property
     def scratch(self) -> Path:

@@ -66,7 +66,7 @@ def verify_session(folder: Path) -> SessionCheck:
         return SessionCheck(
             (SessionFinding(SessionFindingKind.DAMAGED, paths.SESSION, error.problem),)
         )
-    listed = list(_listed(index))
+    listed = list(index.files())
     findings = [
         *_files(folder, listed),
         *_tables(index),
@@ -75,15 +75,6 @@ def verify_session(folder: Path) -> SessionCheck:
     ]
     size = sum(entry.bytes for entry in listed)
     return SessionCheck(tuple(findings), len(index.records), len(listed) + 1, size)
-
-
-def _listed(index: SessionIndex) -> Iterator[FileEntry]:
-    """Every file the session knows, ``session.json`` itself aside."""
-    yield from index.manifest.rig
-    yield from index.manifest.tables
-    yield from (listed.record for listed in index.manifest.captures)
-    for record in index.records:
-        yield from (frame.file for frame in record.frames)
 
 
 def _files(folder: Path, listed: Iterable[FileEntry]) -> Iterator[SessionFinding]:

@@ -26,6 +26,14 @@ def serve(
             metavar="DIR", help="Folder for everything the service keeps.", show_default=False
         ),
     ] = None,
+    root_path: Annotated[
+        str | None,
+        typer.Option(
+            metavar="/PREFIX",
+            help="What a proxy puts before all paths; nothing without it.",
+            show_default=False,
+        ),
+    ] = None,
     station: Annotated[
         list[Path] | None,
         typer.Option(
@@ -39,18 +47,16 @@ def serve(
 
     Example:  rigwright serve --port 8000 --data rigwright-data --station station.toml
     """
-    run_serve_command(host, port, data, station)
+    run_serve_command(host=host, port=port, data_dir=data, stations=station, root_path=root_path)
 
 
-def run_serve_command(
-    host: str | None, port: int | None, data: Path | None, stations: list[Path] | None
-) -> None:
-    """Serve until asked to stop."""
+def run_serve_command(**given: object) -> None:
+    """Serve until asked to stop. ``given``: settings that win over the environment."""
     from service.cli.running import one_line_errors
     from service.settings import read_settings
 
     with one_line_errors():
-        settings = read_settings(host=host, port=port, data_dir=data, stations=stations)
+        settings = read_settings(**given)
         # After the settings, so that a mistake in them is told at once.
         from service.api.app import create_app
         from service.api.context import Service
