@@ -15,12 +15,12 @@ from geometry.camera import RigCamera
 from rig.acquisition.cameras.base import CameraBackend
 from rig.acquisition.capture.rigfacts import read_rig_design
 from rig.acquisition.station.spec import Station
-from rig.acquisition.trigger.box import TriggerBox
+from rig.acquisition.trigger.box import ReportSource
 from rig.simulation.settings import SimulationSettings
 
 
 def simulated_backend(
-    station: Station, box: TriggerBox | None, options: Mapping[str, Any]
+    station: Station, box: ReportSource | None, options: Mapping[str, Any]
 ) -> CameraBackend:
     """The station's cameras, simulated. ``options``: it has none; InputError for any."""
     # Imported here: rendering is heavy, and stations of real cameras need nothing of it.

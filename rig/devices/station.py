@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import contextlib
-import time
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rig.acquisition.cameras.base import CameraBackend
 from rig.acquisition.capture.rig import Rig
 from rig.acquisition.station.spec import Station, TriggerPlan
-from rig.acquisition.trigger.box import TriggerBox
+from rig.acquisition.trigger.box import ReportSource, TriggerBox
 from rig.devices.registry import SIMULATED, make_backend
 from rig.devices.simulated import simulated_backend
+
+if TYPE_CHECKING:
+    from rig.acquisition.trigger.fake.esper import FakeEsper
 
 
 def open_station(station: Station, *, locks: Path | None = None) -> Rig:
@@ -27,6 +30,7 @@ class StationDevices:
 
     def __init__(self) -> None:
         self._beside = contextlib.ExitStack()
+        self._fake_esper: FakeEsper | None = None
 
     def make_box(self, plan: TriggerPlan) -> TriggerBox:
         """The driver of the box that ``plan`` names."""
@@ -35,17 +39,21 @@ class StationDevices:
         from rig.acquisition.trigger.esper import EsperTriggerBox
 
         address = BoxAddress(url, plan.serial_number or "")
-        return EsperTriggerBox(address) if plan.backend == "esper" else SerialTriggerBox(address)
+        if plan.backend != "esper":
+            return SerialTriggerBox(address)
+        return EsperTriggerBox(
+            address, half_press=plan.half_press, focus_lead_us=plan.focus_lead_us
+        )
 
     def _fake_url(self, plan: TriggerPlan) -> str:
         """A box made of nothing, on a pseudo-terminal of this process."""
-        from rig.acquisition.trigger.endpoint import PtyEndpoint
-        from rig.acquisition.trigger.fake.device import FakeBox, FakeSettings
-        from rig.acquisition.trigger.fake.line import FakeLine
-        from rig.acquisition.trigger.fake.serving import FakeServer
+        from rig.devices.fakes import serve_esper, serve_rigwright
 
-        box = FakeBox(time.monotonic_ns, FakeSettings(plan.serial_number or "fake"))
-        server = FakeServer(FakeLine(box, time.monotonic_ns), PtyEndpoint())
+        name = plan.serial_number or "fake"
+        if plan.backend == "esper":
+            server, self._fake_esper = serve_esper(name)
+        else:
+            server = serve_rigwright(name)
         self._beside.callback(server.close)
         return server.url
 
@@ -53,8 +61,16 @@ class StationDevices:
         """The backend of that name with the station's options for it."""
         options = station.backend_options.get(name, {})
         if name == SIMULATED:
-            return simulated_backend(station, box, options)
+            return simulated_backend(station, self._heard(box), options)
         return make_backend(name, options)
+
+    def _heard(self, box: TriggerBox | None) -> ReportSource | None:
+        """Whose reports simulated cameras expose at."""
+        if box is None or self._fake_esper is None:
+            return box
+        from rig.devices.fakes import FakeEsperReports
+
+        return FakeEsperReports(box, self._fake_esper)
 
     def close(self) -> None:
         """End the fake box, where there is one."""

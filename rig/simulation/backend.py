@@ -18,7 +18,7 @@ from typing import Self
 from common.errors import DeviceError, InputError
 from geometry.camera import RigCamera
 from rig.acquisition.cameras.base import CameraInfo
-from rig.acquisition.trigger.box import Edge, FireReport, TriggerBox
+from rig.acquisition.trigger.box import Edge, FireReport, ReportSource
 from rig.simulation.camera import SimulatedCamera, Triggered
 from rig.simulation.pool import RenderPool
 from rig.simulation.settings import SimulationSettings
@@ -40,7 +40,7 @@ class SimulatedBackend:
         self,
         cameras: Sequence[RigCamera],
         settings: SimulationSettings | None = None,
-        box: TriggerBox | None = None,
+        box: ReportSource | None = None,
         clock: Callable[[], int] = time.monotonic_ns,
     ) -> None:
         self.settings = settings or SimulationSettings()

@@ -23,6 +23,8 @@ from rig.acquisition.station.spec import (
 Output = Annotated[int, Field(ge=1, le=64)]
 Microseconds = Annotated[float, Field(ge=0.0, le=1e9)]
 USUAL_LEAD_US = 2000.0
+LONGEST_FOCUS_LEAD_US = 1_500_000.0
+"""An order to a box returns within two seconds."""
 
 
 class TriggerSection(StrictModel):
@@ -56,6 +58,27 @@ class TriggerSection(StrictModel):
         "`if-present`: only an open one stops a capture.",
     )
 
+    half_press: bool = Field(
+        default=False,
+        description="Of an ESPER box: whether it holds the focus lines from arming until the "
+        "capture is over, as most bodies need for a steady lag.",
+    )
+    focus_lead_us: float = Field(
+        default=0.0,
+        ge=0.0,
+        le=LONGEST_FOCUS_LEAD_US,
+        description="With `half_press`: how long the focus lines are held before the box fires, "
+        "at least.",
+    )
+
+    @model_validator(mode="after")
+    def _focus_that_can_be(self) -> Self:
+        if self.half_press and self.backend != "esper":
+            raise ValueError("half_press is of an ESPER box; give each camera a focus_output")
+        if self.focus_lead_us and not self.half_press:
+            raise ValueError("focus_lead_us needs half_press = true")
+        return self
+
     @model_validator(mode="after")
     def _lead_that_can_be(self) -> Self:
         if self.backend == "esper" and self.lead_us:
@@ -67,7 +90,13 @@ class TriggerSection(StrictModel):
         usual = 0.0 if self.backend == "esper" else USUAL_LEAD_US
         lead = usual if self.lead_us is None else self.lead_us
         return TriggerPlan(
-            self.backend, self.url, self.serial_number, lead, Interlock(self.interlock)
+            self.backend,
+            self.url,
+            self.serial_number,
+            lead,
+            Interlock(self.interlock),
+            self.half_press,
+            self.focus_lead_us,
         )
 
 

@@ -31,13 +31,19 @@ class ImageFormat(StrEnum):
 
 @dataclass(frozen=True)
 class TriggerPlan:
-    """The box and how to reach it. ``lead_us`` is from FIRE to the first shot's start."""
+    """The box and how to reach it. ``lead_us`` is from FIRE to the first shot's start.
+
+    ``half_press`` (ESPER): the focus lines are held from ARM until the capture is over, and for
+    ``focus_lead_us`` at least before it fires.
+    """
 
     backend: str
     url: str
     serial_number: str | None = None
     lead_us: float = 2000.0
     interlock: Interlock = Interlock.IF_PRESENT
+    half_press: bool = False
+    focus_lead_us: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -9,11 +9,16 @@ from statistics import median
 
 from common.errors import InputError
 from rig.acquisition.station.delays import Timing
-from rig.acquisition.station.spec import Station
+from rig.acquisition.station.spec import CameraPlan, Station
 from rig.acquisition.synchrony.verdict import Evidence
 
 NORMAL = 1.4826
 """Median absolute deviation to standard deviation, for a normal distribution."""
+
+CHANCE = 0.005
+"""A trend that chance would show less often than this is a drift."""
+CLOCK_US = 1000.0
+"""How far before its edge an exposure may seem to begin: clocks and stamps are not better."""
 
 
 @dataclass(frozen=True)
@@ -31,6 +36,8 @@ class LagEstimate:
     count: int
     exposure_us: float
     source: str
+    drift_us: float = 0.0
+    """By how much it has moved from the first capture to the last; 0 where none can be told."""
 
 
 def estimate_lags(captures: Sequence[Evidence]) -> dict[str, LagEstimate]:
@@ -62,14 +69,28 @@ def _estimate(name: str, figures: Sequence[tuple[float, float, float]], source: 
     known = max(figure[1] for figure in figures)
     scatter = 0.0 if math.isnan(jitter) else 3.0 * jitter / math.sqrt(len(lags))
     exposure = median(figure[2] for figure in figures)
-    return LagEstimate(name, middle, jitter, known + scatter, len(lags), exposure, source)
+    return LagEstimate(
+        name, middle, jitter, known + scatter, len(lags), exposure, source, _drift_us(lags, known)
+    )
+
+
+def _drift_us(lags: Sequence[float], known_us: float) -> float:
+    """How far a line through the lags moves, where it moves more than chance would let it."""
+    if len(lags) < 3:
+        return 0.0
+    from scipy.stats import linregress
+
+    line = linregress(range(len(lags)), lags)
+    moved = float(line.slope) * (len(lags) - 1)
+    return moved if line.pvalue < CHANCE and abs(moved) > known_us else 0.0
 
 
 def new_timings(station: Station, estimates: Mapping[str, LagEstimate]) -> dict[str, Timing]:
     """Delays under which all exposures' middles (or starts) coincide; the smallest one is 0.
 
     Cameras on no output keep theirs. Raises :class:`InputError` when a camera on an output has
-    no estimate, because the others would be moved away from it.
+    no estimate, because the others would be moved away from it; and for a lag that it cannot
+    have, or that drifts.
     """
     wired = [camera for camera in station.cameras if camera.output is not None]
     dumb = [camera.name for camera in wired if camera.name not in estimates]
@@ -80,6 +101,8 @@ def new_timings(station: Station, estimates: Mapping[str, LagEstimate]) -> dict[
             f"the lag of {which} could not be measured",
             "put the timing board where every camera sees it, or use cameras with time stamps",
         )
+    for camera in wired:
+        _require_possible(camera, estimates[camera.name])
     # Middles can be brought together only where every exposure's length is known.
     middles = all(math.isfinite(estimates[camera.name].exposure_us) for camera in wired)
     late = {camera.name: _late_us(estimates[camera.name], middles) for camera in wired}
@@ -88,6 +111,28 @@ def new_timings(station: Station, estimates: Mapping[str, LagEstimate]) -> dict[
         name: Timing(latest - value, max(0.0, estimates[name].lag_us))
         for name, value in late.items()
     }
+
+
+def _require_possible(camera: CameraPlan, estimate: LagEstimate) -> None:
+    """A lag that no such camera has was misread, and one that drifts is another one tomorrow."""
+    off = abs(estimate.lag_us - camera.expected_lag_us)
+    room = estimate.uncertainty_us
+    if off > camera.lag_tolerance_us + room or estimate.lag_us < -room - CLOCK_US:
+        raise InputError(
+            "lag-impossible",
+            f"{camera.name} seems to expose {estimate.lag_us / 1e3:.2f} ms after its edge, and "
+            f"{camera.expected_lag_us / 1e3:.2f} +- {camera.lag_tolerance_us / 1e3:.2f} ms are "
+            "expected",
+            "look at its pictures and at its cable; if it is true, change expected_lag_us or "
+            "lag_tolerance_us",
+        )
+    if estimate.drift_us:
+        raise InputError(
+            "lag-drifting",
+            f"the lag of {camera.name} moved by {estimate.drift_us / 1e3:.2f} ms in "
+            f"{estimate.count} captures",
+            "let it warm up, or see to its clock, then check again",
+        )
 
 
 def _late_us(estimate: LagEstimate, middles: bool) -> float:

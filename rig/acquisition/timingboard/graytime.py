@@ -188,6 +188,10 @@ def _residual(shares: Floats, middle: float, length: float) -> float:
 
 
 def _misfit_scale(shares: Floats, sigmas: Floats, middle: float, length: float) -> float:
-    """How much larger than stated the errors of the shares seem to be, at least 1."""
+    """By how much the stated errors are too small, at least 1.
+
+    Squared: what misfits by more than chance is no chance, and pulls the middle further than as
+    much noise would.
+    """
     misfit = (lit_shares(np.array(middle), np.array(length), len(shares)) - shares) / sigmas
-    return max(1.0, float(np.sqrt((misfit**2).sum() / max(len(shares) - 2, 1))))
+    return max(1.0, float((misfit**2).sum() / max(len(shares) - 2, 1)))

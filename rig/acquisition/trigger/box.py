@@ -161,6 +161,14 @@ class TriggerHealth:
     last_problem: str = ""
 
 
+class ReportSource(Protocol):
+    """Whoever tells what a box did."""
+
+    def subscribe(self, listener: Callable[[FireReport], None]) -> Callable[[], None]:
+        """Hear every report; returns what ends the subscription."""
+        ...
+
+
 class TriggerBox(Protocol):
     """A box that fires cameras.
 

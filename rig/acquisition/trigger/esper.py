@@ -69,15 +69,22 @@ class EsperTriggerBox:
     """A :class:`~rig.acquisition.trigger.box.TriggerBox` for ESPER's protocol.
 
     ``half_press`` holds the focus lines from ARM until the capture is over, as most camera bodies
-    need for a steady shutter lag; they do not answer over USB meanwhile. A lost line is opened
+    need for a steady shutter lag; they do not answer over USB meanwhile. A FIRE that comes sooner
+    than ``focus_lead_us`` after ARM waits for it. A lost line is opened
     again by the next order. The box cannot hold a lead time: the first shot starts with FIRE.
     """
 
     def __init__(
-        self, address: BoxAddress, *, half_press: bool = False, wire_log: WireLog | None = None
+        self,
+        address: BoxAddress,
+        *,
+        half_press: bool = False,
+        focus_lead_us: float = 0.0,
+        wire_log: WireLog | None = None,
     ) -> None:
         self.address = address
         self._half_press = half_press
+        self._focus_lead_ns = int(focus_lead_us * 1000.0)
         self._tape = WireTape(wire_log)
         self._metrics = Metrics()
         self._reader = LineReader(MAX_ANSWER)
@@ -162,6 +169,8 @@ class EsperTriggerBox:
             if time.monotonic_ns() - shot.armed_ns > shot.program.expires_s * 1e9:
                 self._state = TriggerState.READY
                 raise _not_armed(capture_id)
+            if self._half_press:
+                time.sleep(max(shot.armed_ns + self._focus_lead_ns - time.monotonic_ns(), 0) / 1e9)
             shot.sent_ns = time.monotonic_ns()
             self._state = TriggerState.FIRING
             try:

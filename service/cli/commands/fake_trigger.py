@@ -33,12 +33,15 @@ def fake_trigger(
         str, typer.Option(help="Faults and their rates; docs/explanation/trigger.md lists them.")
     ] = "",
     drift_ppm: Annotated[float, typer.Option(help="How much too fast its clock runs.")] = 0.0,
+    esper: Annotated[
+        bool, typer.Option("--esper", help="Be an ESPER TriggerBox; of the rest it has its name.")
+    ] = False,
 ) -> None:
     """Be a trigger box, for rigs without one: it speaks the protocol and fires nothing real.
 
     Example:  rigwright fake-trigger --link box
     """
-    run_fake_trigger_command(link, port, serial_number, seed, faults, drift_ppm)
+    run_fake_trigger_command(link, port, serial_number, seed, faults, drift_ppm, esper=esper)
 
 
 def run_fake_trigger_command(
@@ -48,6 +51,8 @@ def run_fake_trigger_command(
     seed: int,
     faults: str,
     drift_ppm: float,
+    *,
+    esper: bool = False,
 ) -> None:
     """Be a box until interrupted."""
     from rig.acquisition.trigger.fake.program import FakeOptions, run_fake
@@ -62,6 +67,7 @@ def run_fake_trigger_command(
                 seed=seed,
                 faults=faults,
                 drift_ppm=drift_ppm,
+                esper=esper,
             ),
             _say,
         )

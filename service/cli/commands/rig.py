@@ -34,11 +34,16 @@ def rig_check(
 ) -> None:
     """Look at every device, then fire a few times and tell each camera's lag. Files nothing.
 
-    Exit code: 0 all is well, 2 bad input, 4 something is not.
+    Exit code: 0 all is well, 2 bad input, 4 something is not and nothing was written, 5 with
+    --write: the exposures were not together, and new delays were written; check again.
 
     Example:  rigwright rig check --station station.toml --write
     """
     run_rig_check_command(station, captures if fire else 0, write=write, as_json=as_json)
+
+
+WRITTEN = 5
+"""Not well as it was, but new delays are in the file."""
 
 
 def run_rig_check_command(station: Path, captures: int, *, write: bool, as_json: bool) -> None:
@@ -76,7 +81,11 @@ def run_rig_check_command(station: Path, captures: int, *, write: bool, as_json:
             _print_checks(test)
             if check is not None:
                 _print_sync(check)
-    if not (test.ok and (check is None or check.ok)):
+    well = test.ok and (check is None or check.ok)
+    adopted = check is not None and check.adopted
+    if not well and adopted:
+        raise typer.Exit(WRITTEN)
+    if not well or (write and check is not None and not adopted):
         raise typer.Exit(NOT_WELL)
 
 

@@ -190,3 +190,18 @@ def test_settings_are_said_again_when_lost_and_fire_is_not() -> None:
     # The one order that nobody acknowledges is lost, and nobody can tell: it is said so.
     assert not fake.edges
     assert report.acknowledged is False
+
+
+def test_the_focus_lines_are_held_before_it_fires() -> None:
+    box = FakeEsper(time.monotonic_ns)
+    with FakeServer(box, PtyEndpoint()) as server:
+        driver = EsperTriggerBox(BoxAddress(server.url), half_press=True, focus_lead_us=300_000.0)
+        driver.open()
+        driver.arm(ArmRequest("a", {1: Pulse(0.0, 10_000.0)}))
+        held = time.monotonic_ns()
+        assert box.focus
+        driver.fire("a")
+        driver.wait_done("a", 1.0)
+        driver.close()
+    assert box.edges[0].host_ns - held > 250_000_000
+    assert not box.focus

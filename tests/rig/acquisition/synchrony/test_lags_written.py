@@ -1,0 +1,52 @@
+"""Which lags become delays: those that a camera can have and that stay."""
+
+from __future__ import annotations
+
+import pytest
+
+from common.errors import InputError
+from rig.acquisition.station.spec import CameraPlan, Station, TriggerPlan
+from rig.acquisition.synchrony.lags import LagEstimate, _estimate, new_timings
+
+CAMERA = CameraPlan("cam01", "simulated", "1", 1, expected_lag_us=60_000.0)
+
+
+def estimate(lag_us: float, drift_us: float = 0.0) -> LagEstimate:
+    return LagEstimate("cam01", lag_us, 10.0, 100.0, 5, 4000.0, "optical", drift_us)
+
+
+def written(lag_us: float, drift_us: float = 0.0) -> None:
+    station = Station("s", (CAMERA,), TriggerPlan("rigwright", "fake:"))
+    new_timings(station, {"cam01": estimate(lag_us, drift_us)})
+
+
+@pytest.mark.parametrize("lag_us", [41_000.0, 60_000.0, 79_000.0])
+def test_a_lag_that_was_expected_is_made_up_for(lag_us: float) -> None:
+    written(lag_us)
+
+
+@pytest.mark.parametrize("lag_us", [-5000.0, 0.0, 39_000.0, 81_000.0, 401_595.0])
+def test_a_lag_that_no_such_camera_has_is_not_written(lag_us: float) -> None:
+    with pytest.raises(InputError, match="cam01 seems to expose") as caught:
+        written(lag_us)
+    assert caught.value.code == "input/lag-impossible"
+
+
+def test_a_lag_that_drifts_is_told_and_not_written() -> None:
+    with pytest.raises(InputError, match=r"moved by 3\.00 ms in 5 captures") as caught:
+        written(61_000.0, drift_us=3000.0)
+    assert caught.value.code == "input/lag-drifting"
+
+
+@pytest.mark.parametrize(
+    ("lags_us", "drifts"),
+    [
+        ((100.0, 1100.0, 2105.0, 3098.0), True),
+        ((100.0, 140.0, 95.0, 120.0, 130.0), False),
+        ((100.0, 101.0, 102.0, 103.0), False),  # less than a reading is known to
+        ((100.0, 3100.0), False),
+    ],
+)
+def test_a_trend_beyond_chance_is_a_drift(lags_us: tuple[float, ...], drifts: bool) -> None:
+    figures = [(lag, 50.0, 4000.0) for lag in lags_us]
+    assert (_estimate("cam01", figures, "optical").drift_us != 0.0) == drifts

@@ -1,0 +1,52 @@
+"""Boards with bad LEDs, fingers, reflections and rolling shutters: read right, or refused."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import pytest
+from random_boards import BOARD, SOUND, trial
+
+from common.errors import InputError
+from rig.acquisition.timingboard.reading import read_board
+
+FAR = 5.0
+REFUSALS = {f"input/board-{why}" for why in ("dark", "uneven", "unclear", "saturated")}
+
+
+def judged(seeds: range) -> Counter[str]:
+    """How many sound boards there were and were refused, and how many readings were wrong."""
+    found: Counter[str] = Counter()
+    for seed in seeds:
+        one = trial(seed)
+        sound = one.kind in SOUND
+        found["sound"] += sound
+        try:
+            said = read_board(
+                one.picture, BOARD, exposure_us=one.exposure_us if seed // 8 % 2 else None
+            )
+        except InputError as error:
+            assert error.code in REFUSALS
+            found["refused"] += sound
+            found["held back"] += not sound
+            continue
+        half = BOARD.range_us / 2.0
+        off = (said.mid_us - one.mid_us + half) % BOARD.range_us - half
+        if abs(off) > FAR * said.mid_sigma_us:
+            found["wrong"] += 1
+            found[f"wrong {seed} {one.kind}"] += 1
+    return found
+
+
+def test_a_bad_board_is_read_right_or_refused() -> None:
+    found = judged(range(24))
+    assert not found["wrong"], found
+    assert not found["refused"], found
+    assert found["held back"] > 8
+
+
+@pytest.mark.slow
+def test_two_thousand_boards() -> None:
+    found = judged(range(2000))
+    assert not found["wrong"], found
+    assert found["refused"] <= 0.05 * found["sound"], found
