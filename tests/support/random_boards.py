@@ -11,7 +11,8 @@ from rig.acquisition.timingboard.graytime import lit_shares
 from rig.acquisition.timingboard.reading import TimingBoard
 
 BOARD = TimingBoard()
-SCALE = 4.5
+SCALE = 3.2
+PITCH_PX = BOARD.pitch_mm * SCALE
 KINDS = ("sound", "lit room", "dead", "stuck", "covered", "finger", "reflection", "rolling")
 SOUND = KINDS[:2]
 
@@ -32,7 +33,7 @@ def trial(seed: int) -> Trial:
     kind = KINDS[seed % len(KINDS)]
     exposure = float(np.exp(draw.uniform(np.log(300.0), np.log(16_000.0))))
     mid = float(draw.uniform(exposure, BOARD.range_us - exposure))
-    face = (BOARD.face(SCALE) / 255.0).astype(np.float64)
+    face = (BOARD.face(SCALE) / 255.0).astype(np.float32)
     face = np.clip(face, 0.03, 0.9) * (0.5 if kind == "lit room" else draw.uniform(0.1, 0.4))
     middles = BOARD.leds_mm * SCALE + np.array(face.shape[::-1]) / 2.0
     level = levels(draw, kind, mid, exposure, middles)
@@ -80,18 +81,28 @@ def disc(light: np.ndarray, x: float, y: float, radius: float, value: float) -> 
     light[ys, xs] += value * share
 
 
+def near_one(draw: np.random.Generator, middles: np.ndarray) -> np.ndarray:
+    """A place (x, y) on one of the LEDs or beside it."""
+    one = middles.reshape(-1, 2)[draw.integers(2 * BOARD.bits)]
+    return np.asarray(one + draw.normal(0.0, 0.2 * PITCH_PX, 2))
+
+
 def blot(draw: np.random.Generator, light: np.ndarray, middles: np.ndarray, value: float) -> None:
     """Something opaque over one LED or a few."""
-    x, y = middles.reshape(-1, 2)[draw.integers(2 * BOARD.bits)] + draw.normal(0.0, 6.0, 2)
-    axes = (int(draw.uniform(6, 30)), int(draw.uniform(10, 60)))
+    x, y = middles.reshape(-1, 2)[draw.integers(2 * BOARD.bits)] + draw.normal(
+        0.0, 0.2 * PITCH_PX, 2
+    )
+    axes = (int(PITCH_PX * draw.uniform(0.2, 1.0)), int(PITCH_PX * draw.uniform(0.3, 2.0)))
     cv2.ellipse(light, (int(x), int(y)), axes, draw.uniform(0, 360), 0, 360, value, -1)
 
 
 def glare(draw: np.random.Generator, light: np.ndarray, middles: np.ndarray) -> None:
     """A soft spot of light."""
-    x, y = middles.reshape(-1, 2)[draw.integers(2 * BOARD.bits)] + draw.normal(0.0, 6.0, 2)
+    x, y = middles.reshape(-1, 2)[draw.integers(2 * BOARD.bits)] + draw.normal(
+        0.0, 0.2 * PITCH_PX, 2
+    )
     ys, xs = np.mgrid[: light.shape[0], : light.shape[1]]
-    width = draw.uniform(3.0, 25.0)
+    width = PITCH_PX * draw.uniform(0.1, 0.8)
     light += draw.uniform(0.05, 0.4) * np.exp(-0.5 * ((xs - x) ** 2 + (ys - y) ** 2) / width**2)
 
 
@@ -104,6 +115,7 @@ def photographed(draw: np.random.Generator, light: np.ndarray) -> np.ndarray:
     size = (width + 120, height + 120)
     seen = cv2.warpPerspective(light, matrix, size, flags=cv2.INTER_AREA, borderValue=0.2)
     seen = cv2.GaussianBlur(seen, (0, 0), 0.6)
-    seen = np.clip(seen + draw.normal(0.0, 0.004, seen.shape), 0.0, 1.0)
+    noise = 0.004 * draw.standard_normal(seen.shape, np.float32)
+    seen = np.clip(seen + noise, 0.0, 1.0)
     code = np.where(seen <= 0.0031308, 12.92 * seen, 1.055 * seen ** (1 / 2.4) - 0.055)
     return np.round(255.0 * code).astype(np.uint8)

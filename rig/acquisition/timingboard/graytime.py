@@ -8,7 +8,7 @@ squares: the slow bits say roughly when, bits that change within the interval sa
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,6 +18,9 @@ _ZOOMS = 11
 _SIDE = 13
 _KEPT = 3
 _ZOOMED = 10
+_WIDENINGS = 3
+_RIVAL = 4.0
+"""Standard deviations within which another place explains the shares nearly as well."""
 _NOMINAL_SIGMA = 0.1
 """An exposure time that a camera states is believed to this share of itself."""
 
@@ -73,11 +76,27 @@ def solve_interval(
     if not starts:
         # The stated length is beyond what the board can show; all lengths are tried instead.
         return solve_interval(shares, sigmas)
-    found = [_zoom(shares, sigmas, s, nominal_length_ticks) for s in sorted(starts)[:_ZOOMED]]
-    _, middle, length = min(found)
+    found = _zoom(shares, sigmas, np.array(sorted(starts)[:_ZOOMED]), nominal_length_ticks)
+    _, middle, length = found[0]
     if length < _SHORT_TICKS:
-        return _averaged(shares, sigmas, middle, nominal_length_ticks)
-    return _with_errors(shares, sigmas, middle, length, nominal_length_ticks)
+        best = _averaged_short(shares, sigmas, middle, nominal_length_ticks)
+    else:
+        best = _with_errors(shares, sigmas, middle, length, nominal_length_ticks)
+    return _with_rivals(best, found, _misfit_scale(shares, sigmas, middle, length))
+
+
+def _with_rivals(best: Interval, found: Floats, scale: float) -> Interval:
+    """``best``, known no better than to a third of the way to any other place that may be it.
+
+    ``found`` (n, 3): cost, middle and length of each place where the cost is least, best first.
+    """
+    rivals = found[:, 0] - found[0, 0] < (_RIVAL * scale) ** 2
+    apart = np.abs(found[rivals, 1:] - found[0, 1:]).max(axis=0) / 3.0
+    return replace(
+        best,
+        middle_sigma_ticks=max(best.middle_sigma_ticks, float(apart[0])),
+        length_sigma_ticks=max(best.length_sigma_ticks, float(apart[1])),
+    )
 
 
 def _starts(
@@ -118,30 +137,30 @@ def _cost(
     return np.asarray(cost)
 
 
-def _zoom(
-    shares: Floats, sigmas: Floats, start: tuple[float, float, float, float], nominal: float | None
-) -> tuple[float, float, float]:
-    """Least cost near a start, and where: (cost, middle, length).
+def _zoom(shares: Floats, sigmas: Floats, starts: Floats, nominal: float | None) -> Floats:
+    """Least cost near each start (n, 4), and where: (n, 3) cost, middle, length; least first.
 
     The cost is piecewise smooth with kinks at every tick, so grids that shrink round the best
     place are surer than following slopes.
     """
-    here, half_m, half_l = start[:3], start[3], 0.12 * start[2]
+    here, half_m, half_l = starts[:, :3].copy(), starts[:, 3], 0.12 * starts[:, 2]
+    side, rows = np.linspace(-1.0, 1.0, _SIDE), np.arange(len(starts))
     for _ in range(_ZOOMS):
-        middles = here[1] + half_m * np.linspace(-1.0, 1.0, _SIDE)
-        lengths = here[2] + half_l * np.linspace(-1.0, 1.0, _SIDE)
-        grid_m, grid_l = np.meshgrid(middles, np.maximum(lengths, _SHORTEST_TICKS), indexing="ij")
-        cost = _cost(shares, sigmas, grid_m, grid_l, nominal)
-        k = int(cost.argmin())
-        here = min(here, (float(cost.flat[k]), float(grid_m.flat[k]), float(grid_l.flat[k])))
+        middles = here[:, 1, None] + half_m[:, None] * np.repeat(side, _SIDE)
+        lengths = here[:, 2, None] + half_l[:, None] * np.tile(side, _SIDE)
+        lengths = np.maximum(lengths, _SHORTEST_TICKS)
+        cost = _cost(shares, sigmas, middles, lengths, nominal)
+        k = cost.argmin(axis=1)
+        there = np.stack([cost[rows, k], middles[rows, k], lengths[rows, k]], axis=1)
+        here = np.where((there[:, 0] < here[:, 0])[:, None], there, here)
         half_m, half_l = 0.45 * half_m, 0.45 * half_l
-    return here
+    return np.asarray(here[np.argsort(here[:, 0])])
 
 
 def _with_errors(
     shares: Floats, sigmas: Floats, middle: float, length: float, nominal: float | None
 ) -> Interval:
-    """The interval with standard deviations from the slopes of the shares."""
+    """The interval, averaged as far about the best place as the slopes of the shares say."""
     bits = len(shares)
     step = 1e-3 * length
     moved = np.array([[step, 0.0], [-step, 0.0], [0.0, step], [0.0, -step]])
@@ -151,34 +170,57 @@ def _with_errors(
     # No reading is worse than not knowing where in its length the interval lies.
     prior = np.array([0.3 * length, 0.5 * length if nominal is None else _NOMINAL_SIGMA * nominal])
     covariance = np.linalg.inv(weighted.T @ weighted + np.diag(prior**-2.0))
-    sigma = _misfit_scale(shares, sigmas, middle, length) * np.sqrt(np.diag(covariance))
-    return Interval(
-        middle, length, float(sigma[0]), float(sigma[1]), _residual(shares, middle, length)
-    )
+    width_m, width_l = np.sqrt(np.diag(covariance))
+    best = Interval(middle, length, 0.0, 0.0, 0.0)
+    # A kink near the best place makes its slopes steeper than the hill is: as far as it goes.
+    for _ in range(_WIDENINGS):
+        middles = middle + 6.0 * width_m * np.linspace(-1.0, 1.0, 121)
+        lengths = length + 6.0 * width_l * np.linspace(-1.0, 1.0, 61)
+        lengths = lengths[lengths > 0.2 * length]
+        best = _averaged(shares, sigmas, middles, lengths, nominal)
+        wide_m, wide_l = best.middle_sigma_ticks, best.length_sigma_ticks
+        if wide_m < 1.3 * width_m and wide_l < 1.3 * width_l:
+            break
+        width_m, width_l = max(width_m, wide_m), max(width_l, wide_l)
+    return best
 
 
-def _averaged(shares: Floats, sigmas: Floats, middle: float, nominal: float | None) -> Interval:
-    """Mean and standard deviation of all short intervals about ``middle``, by their likelihood.
+def _averaged_short(
+    shares: Floats, sigmas: Floats, middle: float, nominal: float | None
+) -> Interval:
+    """Over all short intervals about ``middle``.
 
     An exposure shorter than a tick may show no change at all: every place within the tick is
     then as likely as any other, which no slope at one place can tell.
     """
     middles = middle + np.linspace(-2.0, 2.0, 321)
     lengths = np.geomspace(_SHORTEST_TICKS, 2.0 * _SHORT_TICKS, 120)
+    found = _averaged(shares, sigmas, middles, lengths, nominal)
+    return replace(
+        found,
+        # The grid itself is no finer than this.
+        middle_sigma_ticks=float(np.hypot(found.middle_sigma_ticks, 0.005)),
+        length_sigma_ticks=float(np.hypot(found.length_sigma_ticks, 0.02 * found.length_ticks)),
+    )
+
+
+def _averaged(
+    shares: Floats, sigmas: Floats, middles: Floats, lengths: Floats, nominal: float | None
+) -> Interval:
+    """Mean and standard deviation of the intervals of a grid, by their likelihood."""
     grid_m, grid_l = np.meshgrid(middles, lengths, indexing="ij")
     cost = _cost(shares, sigmas, grid_m, grid_l, nominal)
     k = int(cost.argmin())
-    scale = _misfit_scale(shares, sigmas, float(grid_m.flat[k]), float(grid_l.flat[k]))
-    weight = np.exp(-0.5 * (cost - cost.min()) / scale**2)
+    top = float(grid_m.flat[k]), float(grid_l.flat[k])
+    weight = np.exp(-0.5 * (cost - cost.min()) / _misfit_scale(shares, sigmas, *top) ** 2)
     weight /= weight.sum()
     mean_m, mean_l = float((weight * grid_m).sum()), float((weight * grid_l).sum())
     return Interval(
         mean_m,
         mean_l,
-        # The grid itself is no finer than this.
-        float(np.hypot(np.sqrt((weight * (grid_m - mean_m) ** 2).sum()), 0.005)),
-        float(np.hypot(np.sqrt((weight * (grid_l - mean_l) ** 2).sum()), 0.02 * mean_l)),
-        _residual(shares, float(grid_m.flat[k]), float(grid_l.flat[k])),
+        float(np.sqrt((weight * (grid_m - mean_m) ** 2).sum())),
+        float(np.sqrt((weight * (grid_l - mean_l) ** 2).sum())),
+        _residual(shares, *top),
     )
 
 

@@ -38,7 +38,6 @@ _FAINT = 0.02
 _FLOOR = 0.004
 """Standard deviation of a pair's share that no averaging removes: flare, rise times, coding."""
 
-_SPREAD_ROOM = 2.0
 _LEAST_RADIUS_PX = 2.0
 _REMEDY = "let the board face the camera, sharp, at least 300 pixels wide, markers uncovered"
 
@@ -263,39 +262,35 @@ def _shares(
     if scale.min() < _LEAST_RADIUS_PX:
         problem = f"the timing board's LEDs are {2.0 * scale.min():.1f} pixels wide"
         raise InputError("board-too-small", problem, "bring it nearer: 4 pixels and more")
+    back = np.asarray(np.linalg.inv(matrix))
     level, error, around = np.array(
-        [_level(light, matrix, middle, radius) for middle in middles]
+        [_level(light, (matrix, back), middle, radius) for middle in middles]
     ).T.reshape(3, 2, board.bits)
     full = level.sum(axis=0)
     if full.min() < _FAINT:
         problem = "LEDs of the timing board are dark in both rows"
         raise InputError("board-dark", problem, "switch it on, expose longer, check its LEDs")
-    spread = require_sound(Lamps(level, error, around))
+    doubt = require_sound(Lamps(level, error, around))
     share = level[0] / full
     # Of a / (a + b) with errors of its own of a and b.
     sigma = np.hypot((1.0 - share) * error[0], share * error[1]) / full
-    # Two LEDs of a pair that are not equally bright bend its share where both are lit for a while.
-    # Some eight LEDs tell how unequal they are to a quarter: room for twice that.
-    unequal = share * (1.0 - share) * np.sqrt(2.0) * _SPREAD_ROOM * spread
-    return share, np.sqrt(sigma**2 + _FLOOR**2 + unequal**2)
+    return share, np.sqrt(sigma**2 + _FLOOR**2 + doubt**2)
 
 
 def _level(
-    light: NDArray[np.float32], matrix: Floats, middle: Floats, radius: float
+    light: NDArray[np.float32], matrices: tuple[Floats, Floats], middle: Floats, radius: float
 ) -> tuple[float, float, float]:
     """Light of one LED above the board round it, its mean's standard error, and the board's."""
     reach = _RING[1] * radius
     corner = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
-    box = _to_image(matrix, middle + reach * corner)
+    box = _to_image(matrices[0], middle + reach * corner)
     low = np.floor(box.min(axis=0)).astype(int)
     high = np.ceil(box.max(axis=0)).astype(int) + 1
     height, width = light.shape
     if (low < 0).any() or high[0] > width or high[1] > height:
         raise InputError("board-not-seen", "the timing board is cut by the frame", _REMEDY)
     y, x = np.mgrid[low[1] : high[1], low[0] : high[0]]
-    back = _to_image(
-        np.asarray(np.linalg.inv(matrix)), np.stack([x, y], axis=-1).astype(np.float64)
-    )
+    back = _to_image(matrices[1], np.stack([x, y], axis=-1).astype(np.float64))
     distance = np.linalg.norm(back - middle, axis=-1) / radius
     patch = light[low[1] : high[1], low[0] : high[0]]
     inner = patch[distance < _INNER]

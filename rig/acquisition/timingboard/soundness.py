@@ -24,6 +24,8 @@ _UNEVEN = (0.12, 0.45)
 on one whose LEDs are so unequal that their own spread says more."""
 _AROUND = 0.15
 """By what share of an LED's light the strip round one may be brighter than round the others."""
+_SPREAD_ROOM = 2.0
+"""Some eight LEDs tell how unequal all are to a quarter: room for twice that."""
 _NEGATIVE = 0.05
 _MISFIT = 0.03
 """How far a bit's share may be from what the exposure would give; the reader's floor is 0.004."""
@@ -49,9 +51,11 @@ class Lamps:
     around: Floats
 
 
-def require_sound(lamps: Lamps) -> float:
-    """How unequal the board's LEDs are: the standard deviation of their light, as a share of it.
+def require_sound(lamps: Lamps) -> Floats:
+    """By how much a bad LED may have changed each pair's share unseen: its standard deviation.
 
+    Where pairs differ by little, nothing tells a fault that hides there from LEDs unequally
+    bright by themselves: what a pair is unlike the others counts as one LED's fault altogether.
     Raises :class:`InputError` ``board-uneven`` naming the pair that is not like the others.
     """
     full = lamps.level.sum(axis=0)
@@ -72,7 +76,10 @@ def require_sound(lamps: Lamps) -> float:
     worst = int(np.argmax(np.abs(relative) - room))
     if abs(relative[worst]) > room[worst]:
         raise _uneven(worst, f"gives {100.0 * (1.0 + relative[worst]):.0f} % of the others' light")
-    return spread
+    share = lamps.level[0] / full
+    # Two LEDs of a pair that are not equally bright bend its share where both are lit for a while.
+    unequal = share * (1.0 - share) * np.sqrt(2.0) * _SPREAD_ROOM * spread
+    return np.asarray(np.hypot(relative, unequal))
 
 
 def _trend(values: Floats) -> Floats:

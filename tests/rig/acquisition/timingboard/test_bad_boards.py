@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from concurrent.futures import ProcessPoolExecutor
 
 import pytest
 from random_boards import BOARD, SOUND, trial
@@ -39,14 +40,17 @@ def judged(seeds: range) -> Counter[str]:
 
 
 def test_a_bad_board_is_read_right_or_refused() -> None:
-    found = judged(range(24))
+    found = judged(range(16))
     assert not found["wrong"], found
     assert not found["refused"], found
-    assert found["held back"] > 8
+    assert found["held back"] > 6
 
 
 @pytest.mark.slow
 def test_two_thousand_boards() -> None:
-    found = judged(range(2000))
+    found: Counter[str] = Counter()
+    with ProcessPoolExecutor(2) as pool:
+        for part in pool.map(judged, [range(k, k + 50) for k in range(0, 2000, 50)]):
+            found.update(part)
     assert not found["wrong"], found
     assert found["refused"] <= 0.05 * found["sound"], found
