@@ -17,6 +17,8 @@ NORMAL = 1.4826
 
 CHANCE = 0.005
 """A trend that chance would show less often than this is a drift."""
+LEAST_DRIFT_US = 200.0
+"""A lag that moves by less in a check matters to no exposure that such a rig makes."""
 CLOCK_US = 1000.0
 """How far before its edge an exposure may seem to begin: clocks and stamps are not better."""
 
@@ -82,7 +84,7 @@ def _drift_us(lags: Sequence[float], known_us: float) -> float:
 
     line = linregress(range(len(lags)), lags)
     moved = float(line.slope) * (len(lags) - 1)
-    return moved if line.pvalue < CHANCE and abs(moved) > known_us else 0.0
+    return moved if line.pvalue < CHANCE and abs(moved) > max(known_us, LEAST_DRIFT_US) else 0.0
 
 
 def new_timings(station: Station, estimates: Mapping[str, LagEstimate]) -> dict[str, Timing]:
