@@ -195,3 +195,8 @@ class Design:
     def feasible(self) -> bool:
         """Whether every limit is satisfied."""
         return self.quality.feasible
+
+    @property
+    def stands(self) -> bool:
+        """Whether the rig was there already, and nothing was placed."""
+        return self.cameras is self.start_cameras

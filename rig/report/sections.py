@@ -192,6 +192,8 @@ def _collision(kind: str, name: str, other: str) -> str:
 def solver(design: Design) -> str:
     """The solver's word."""
     report = design.solver
+    if design.stands:
+        return section("solver", "The solver's word", f"None: {esc(report.why_stopped)}.", "")
     status = {
         Status.CONVERGED: "converged",
         Status.STOPPED: "stopped early",

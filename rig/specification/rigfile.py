@@ -36,10 +36,10 @@ class RigFile(StrictModel):
     )
     cameras: int | None = Field(
         default=None,
-        ge=1,
+        ge=0,
         le=500,
-        description="How many cameras to place, fixed ones not counted. Without it: as many as "
-        "there are `[[start]]` poses, or 7.",
+        description="How many cameras to place, fixed ones not counted; 0 for a rig that stands. "
+        "Without it: as many as there are `[[start]]` poses, or 7.",
     )
     seed: int = Field(default=0, ge=0, le=2**53 - 1, description="Seed of everything random.")
     starts: int = Field(default=8, ge=1, le=1000, description="How many starts to try.")
@@ -60,7 +60,7 @@ class RigFile(StrictModel):
         return RigSpec(
             name=self.name,
             camera=camera,
-            count=self.cameras or len(self.start) or 7,
+            count=(len(self.start) or 7) if self.cameras is None else self.cameras,
             seed=self.seed,
             starts=self.starts,
             limits=self.limits.to_limits(),

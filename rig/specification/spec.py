@@ -19,7 +19,8 @@ class RigSpec:
 
     ``count`` cameras of the kind ``camera`` are placed; ``fixed`` ones stand already and come
     on top. ``start`` holds one start pose per camera to place, or none. ``starts`` is the
-    number of starts to try. Raises :class:`InputError` when the parts contradict each other.
+    number of starts to try. With a ``count`` of 0 the rig is the fixed cameras. Raises
+    :class:`InputError` when the parts contradict each other.
     """
 
     name: str
@@ -35,11 +36,11 @@ class RigSpec:
 
     def __post_init__(self) -> None:
         total = self.count + len(self.fixed)
-        if self.count < 1 or total < 2:
+        if self.count < 0 or total < 2:
             raise InputError(
                 "rig-too-few-cameras",
                 f"the rig has {total} camera{'' if total == 1 else 's'}, {self.count} to place",
-                "place at least one and have two in all: one camera cannot measure",
+                "place more, or give the [[fixed]] ones: one camera cannot measure",
             )
         if self.start and len(self.start) != self.count:
             raise InputError(

@@ -19,7 +19,8 @@ class DesignRequest(Request):
 
     rig: Annotated[RigFile, Field(description="The structure of a rig file, as JSON.")]
     cameras: Annotated[
-        int | None, Field(ge=1, le=500, description="How many cameras to place.")
+        int | None,
+        Field(ge=0, le=500, description="How many cameras to place; 0 for a rig that stands."),
     ] = None
     seed: Annotated[int | None, Field(ge=0, le=LARGEST_JSON_INTEGER)] = None
     starts: Annotated[int | None, Field(ge=1, le=1000, description="Starts to try.")] = None
@@ -61,6 +62,9 @@ class DesignResult(EvaluationResult):
     conflicts: list[Conflict]
     collisions: int
     seconds: float
+    placed: Annotated[
+        int | None, Field(description="Cameras placed; 0 for a rig that was told of as it stands.")
+    ] = None
 
 
 class RigExample(Model):

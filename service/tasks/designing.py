@@ -27,6 +27,7 @@ from service.tasks.stages import between
 from solver.design import design as solve
 from solver.quality import evaluate
 from solver.result import Design, Quality
+from solver.standing import as_it_stands
 
 _READING = 0.02
 _DESIGNING = 0.96
@@ -76,7 +77,19 @@ def _designed(
     """Read, design, lay out, write."""
     running.report(Progress("reading the scan", 0.0))
     prepared = prepare_subject(read_scan(scan, spec.scan_options), spec.subject_options)
-    made = solve(
+    made = _solved(prepared, spec, workers, running)
+    running.report(Progress("writing the files", _DESIGNING))
+    layout = make_layout(made.cameras, prepared.subject, spec.limits)
+    write_design_folder(folder, made, layout, prepared, spec, scan_name)
+    running.report(Progress("done", 1.0))
+    return _result(made, layout, prepared, spec)
+
+
+def _solved(prepared: PreparedSubject, spec: RigSpec, workers: int, running: Running) -> Design:
+    """The cameras of a rig, or those it has where none is to be placed."""
+    if spec.count == 0:
+        return as_it_stands(prepared.subject, spec.fixed, spec.limits, spec.seed)
+    return solve(
         prepared.subject,
         spec.camera,
         spec.limits,
@@ -89,11 +102,6 @@ def _designed(
         progress=between(running.report, _READING, _DESIGNING),
         cancel=running.cancel,
     )
-    running.report(Progress("writing the files", _DESIGNING))
-    layout = make_layout(made.cameras, prepared.subject, spec.limits)
-    write_design_folder(folder, made, layout, prepared, spec, scan_name)
-    running.report(Progress("done", 1.0))
-    return _result(made, layout, prepared, spec.name)
 
 
 def write_scan(scan: Scan, path: Path) -> None:
@@ -120,7 +128,7 @@ def _scored(quality: Quality, cameras: int, prepared: PreparedSubject) -> Evalua
     )
 
 
-def _result(made: Design, layout: Layout, prepared: PreparedSubject, name: str) -> DesignResult:
+def _result(made: Design, layout: Layout, prepared: PreparedSubject, spec: RigSpec) -> DesignResult:
     """A design in short."""
     scored = _scored(made.quality, len(made.cameras), prepared)
     conflicts = [
@@ -129,7 +137,7 @@ def _result(made: Design, layout: Layout, prepared: PreparedSubject, name: str) 
     ]
     return DesignResult(
         **dict(scored),
-        name=name,
+        name=spec.name,
         seed=made.solver.seed,
         status=str(made.solver.status),
         why_stopped=made.solver.why_stopped,
@@ -137,4 +145,5 @@ def _result(made: Design, layout: Layout, prepared: PreparedSubject, name: str) 
         conflicts=conflicts,
         collisions=len(layout.collisions),
         seconds=made.solver.seconds,
+        placed=spec.count,
     )

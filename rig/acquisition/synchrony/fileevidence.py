@@ -17,6 +17,7 @@ from pathlib import PurePath
 from rig.acquisition.cameras.base import Frame
 from rig.acquisition.synchrony.cameraframes import Method, Pair, Pairing
 from rig.acquisition.synchrony.faults import Fault, FaultKind
+from rig.acquisition.synchrony.filenumbers import FileNumbers, file_number
 from rig.acquisition.synchrony.imagechecks import is_raw
 
 SECOND_NS = 1_000_000_000
@@ -115,7 +116,7 @@ class CameraFiles:
     clues: list[Clue] = field(default_factory=list)
     outstanding: int = 0
     serial: str = ""
-    number: int | None = None
+    numbers: FileNumbers = field(default_factory=FileNumbers)
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,15 +181,7 @@ class FileEvidence:
     ) -> list[FiredShot]:
         """The shots of this capture that a file may be of; none when it is held back."""
         if exposure.time is None:
-            if memory.outstanding:
-                why = "it tells no time, and an earlier picture has not come: which it is"
-                _hold(given, exposure, f"{why} cannot be told", faults)
-                return []
-            number = _number(exposure.name)
-            if number is not None and memory.number is not None and number <= memory.number:
-                _hold(given, exposure, "its number is not above those of before", faults)
-                return []
-            return list(given.shots)
+            return _untimed(given, memory, exposure, faults)
         if memory.offset is None:
             return self._first(given, memory, exposure, exposure.time, faults)
         age_ns = max(0, given.shots[0].at_ns - memory.known_at_ns)
@@ -272,9 +265,11 @@ class FileEvidence:
                 memory.clues.clear()
             tags = exposure.frames[0].metadata
             memory.serial = memory.serial or tags.get("BodySerialNumber", "")
-            counted = _number(exposure.name)
-            memory.number = memory.number if counted is None else counted
+        # A picture whose number was believed settles which of those before it are lost.
+        if any(method is Method.ARRIVAL for _, method in found.values()):
+            memory.outstanding = 0
         memory.outstanding += len(given.shots) - len(found)
+        memory.numbers.capture_ends([file_number(found[k][0].name) for k in sorted(found)])
 
 
 def _offset(at: Span, shot: FiredShot, wait_ns: int) -> Span:
@@ -290,9 +285,33 @@ def _is_plain(offset: Span) -> bool:
     return abs(middle) <= WIDEST_ZONE_NS + half and away <= max(NEAR_NS, half)
 
 
-def _number(name: str) -> int | None:
-    digits = re.findall(r"\d+", PurePath(name).stem)
-    return int(digits[-1]) if digits else None
+def _untimed(
+    given: FileDelivery, memory: CameraFiles, exposure: FileExposure, faults: list[Fault]
+) -> list[FiredShot]:
+    """The shots that a file without a time may be of: its number must tell, or nothing lacks."""
+    number, shots = file_number(exposure.name), given.shots
+    ahead = memory.numbers.ahead(number)
+    if ahead is not None and ahead <= 0:
+        # What the capture before lacks is then the picture that was held back.
+        explained = memory.outstanding <= (len(shots) if memory.numbers.may_begin_anew else 0)
+        if memory.numbers.begins_anew(number, len(shots)) and explained:
+            return list(shots)
+        why = "its number is not above those of before; if the count began anew, take one more"
+        _hold(given, exposure, f"{why} capture", faults)
+        return []
+    if not memory.outstanding:
+        return list(shots)
+    place = 0 if ahead is None else ahead - memory.outstanding
+    if 1 <= place <= len(shots):
+        return [shots[place - 1]]
+    why = "it tells no time, and an earlier picture has not come: which it is cannot be told"
+    _hold(
+        given,
+        exposure,
+        f"{why}; let the camera write times, or open the station anew when none is on its way",
+        faults,
+    )
+    return []
 
 
 def _method(exposure: FileExposure) -> Method:
@@ -371,7 +390,7 @@ def _exposures(frames: Sequence[Frame]) -> list[FileExposure]:
 
     def order(e: FileExposure) -> tuple[int, int, int]:
         at = 0 if e.time is None else e.time.low_ns
-        return at, _number(e.name) or 0, e.frames[0].arrived_host_ns
+        return at, int(file_number(e.name) or 0), e.frames[0].arrived_host_ns
 
     return sorted(exposures, key=order)
 

@@ -185,9 +185,12 @@ def make_plan(
     """The plan of a mount for ``cameras``, whose poses are those of a design.
 
     Cameras that are ``fixed`` stand already: they are kept clear of and count in every figure,
-    but nothing is built for them. Raises a one-line :class:`InputError` for a mount that cannot
+    but nothing is built for them, unless all are: then the mount is to hold them where they are.
+    Raises a one-line :class:`InputError` for a mount that cannot
     be built, with the nearest possibility, and :class:`CancelledError` soon after ``cancel``.
     """
+    if all(camera.fixed for camera in cameras):
+        cameras = tuple(replace(camera, fixed=False) for camera in cameras)
     job = _Job(cameras, subject, limits, progress, cancel or NeverCancelled())
     free = tuple(camera for camera in cameras if not camera.fixed)
     if not free:

@@ -26,9 +26,9 @@ def design(
     cameras: Annotated[
         int | None,
         typer.Option(
-            min=1,
+            min=0,
             max=500,
-            help="Cameras to place, instead of the rig's number.",
+            help="Cameras to place, instead of the rig's number; 0: its fixed ones are the rig.",
             show_default=False,
         ),
     ] = None,
@@ -66,6 +66,18 @@ def design(
     run_design(
         DESIGN, request, {"scan": scan}, run, out, spare=[scan, rig], as_json=as_json, force=force
     )
+
+
+def standing_design(rig: Path, scan: Path, folder: Path) -> Path:
+    """The design, written into ``folder``, of a rig that stands: its fixed cameras."""
+    from rig.specification.rigfile import read_rig_file
+    from service.cli.running import run_task
+    from service.kinds.base import RunContext
+    from service.kinds.design import DESIGN, DesignRequest
+
+    request = DesignRequest(rig=read_rig_file(rig), cameras=0)
+    run_task(DESIGN, request, {"scan": scan}, folder, RunContext(scan_name=scan.name))
+    return folder / "design.json"
 
 
 def run_design(
@@ -109,7 +121,7 @@ def _show(result: DesignResult, out: Path, *, as_json: bool) -> None:
         from service.cli.tables import design_tables
 
         design_tables.print_notes(result)
-        design_tables.print_figures(result, result.start_cost_mm2)
+        design_tables.print_figures(result, result.start_cost_mm2 if result.placed else None)
         design_tables.print_limits(constraints)
         if result.conflicts:
             design_tables.print_conflicts(result)
@@ -120,6 +132,8 @@ def _show(result: DesignResult, out: Path, *, as_json: bool) -> None:
 
 def _why_infeasible(result: DesignResult) -> str:
     families = list(dict.fromkeys(name.split("/", 1)[0] for name in result.violated))
+    if result.placed == 0:
+        return f"the rig as it stands breaks limits ({', '.join(families)}); its report was written"
     in_conflict = [row.family for row in result.conflicts] or families
     return (
         f"the limits cannot all be met ({', '.join(in_conflict)}); the nearest design was written, "

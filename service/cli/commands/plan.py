@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
+import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -15,10 +17,6 @@ if TYPE_CHECKING:
 
 
 def plan(
-    design: Annotated[
-        Path,
-        typer.Argument(metavar="DESIGN.json", help="The cameras to hold.", show_default=False),
-    ],
     mount: Annotated[
         Path,
         typer.Option(
@@ -30,6 +28,18 @@ def plan(
     out: Annotated[
         Path, typer.Option(metavar="DIR", help="Folder to write into.", show_default=False)
     ],
+    design: Annotated[
+        Path | None,
+        typer.Argument(metavar="[DESIGN.json]", help="The cameras to hold.", show_default=False),
+    ] = None,
+    rig: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="RIG.toml",
+            help="In place of a design: a rig file with [[fixed]] cameras, of a rig that stands.",
+            show_default=False,
+        ),
+    ] = None,
     scan: Annotated[
         Path | None,
         typer.Option(
@@ -54,10 +64,13 @@ def plan(
     Exit code: 0 done, 2 bad input, 3 something clashes, 130 interrupted.
 
     Example:  rigwright plan rig/design.json --mount t-slot.toml --out plan
+
+    Example:  rigwright plan --rig rig.toml --scan head.ply --mount tripods.toml --out plan
     """
     from common.errors import InputError
     from common.files.folders import new_folder
     from rig.build.mounts.systemfile import read_system_file
+    from service.cli.commands.design import standing_design
     from service.cli.running import one_line_errors, require_files, run_task
     from service.cli.scans import scan_of
     from service.kinds.plan import PAPERS, PLAN, PlanRequest
@@ -66,18 +79,35 @@ def plan(
     with one_line_errors():
         if paper not in PAPERS:
             raise InputError("paper", f"there is no paper {paper!r}", "give A4 or A3")
-        head = scan or scan_of(design)
-        with new_folder(out, force=force, spare=[design, mount, head]) as folder:
-            require_files([design, mount, head])
+        with contextlib.ExitStack() as stack:
+            given = _asked(design, rig, scan)
+            head = scan or scan_of(given)
+            folder = stack.enter_context(new_folder(out, force=force, spare=[given, mount, head]))
+            require_files([given, mount, head])
             request = PlanRequest(
                 mount=read_system_file(mount), name=name, seed=seed, paper=PAPERS[paper], step=step
             )
-            result = run_task(PLAN, request, {"design": design, "scan": head}, folder)
+            if rig is not None:
+                beside = stack.enter_context(tempfile.TemporaryDirectory())
+                given = standing_design(rig, head, Path(beside))
+            result = run_task(PLAN, request, {"design": given, "scan": head}, folder)
         _show(result, out, as_json=as_json)
     why = why_not(result)
     if why:
         sys.stderr.write(f"rigwright: {why}\n")
         raise typer.Exit(EXIT_INFEASIBLE)
+
+
+def _asked(design: Path | None, rig: Path | None, scan: Path | None) -> Path:
+    """The file that says where the cameras are."""
+    from common.errors import InputError
+
+    given = design or rig
+    if given is None or (design and rig):
+        raise InputError("plan-of-what", "a plan is of one rig", "give DESIGN.json, or --rig")
+    if rig is not None and scan is None:
+        raise InputError("no-scan", "a rig file does not know its head", "give --scan")
+    return given
 
 
 def why_not(result: PlanResult) -> str:

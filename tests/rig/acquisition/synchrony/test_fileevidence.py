@@ -132,6 +132,40 @@ def test_without_times_a_lost_picture_stops_the_guessing() -> None:
     assert not result.pairs and "cannot be told" in held(result)
 
 
+def untimed(evidence: FileEvidence, *numbers: int | None) -> list[bool]:
+    """Captures that bring a picture of each number, or none: whether it was believed."""
+    return [
+        bool(
+            sorted_one(
+                evidence,
+                k,
+                NOON + timedelta(seconds=30 * k),
+                *([] if n is None else [picture(f"DSC_{n:04d}.JPG", None, f"{k}")]),
+            ).pairs
+        )
+        for k, n in enumerate(numbers)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("numbers", "believed"),
+    [
+        ((9998, 9999, 1, 2), (1, 1, 1, 1)),
+        ((9998, None, 1, 2), (1, 0, 1, 1)),  # 9999 was lost
+        ((9998, None, 9999, 1), (1, 0, 0, 0)),  # late, or never made: nobody can tell
+        ((9998, None, 1, 9999), (1, 0, 1, 0)),  # late beyond the end
+        ((345, 1, 2, 3), (1, 0, 1, 1)),  # another card
+        ((345, 12, 346, 347), (1, 0, 0, 0)),
+        ((345, None, 347, 346, 348), (1, 0, 1, 0, 0)),
+        ((7, None, 9, None, 11), (1, 0, 1, 0, 1)),
+    ],
+)
+def test_numbers_tell_where_no_time_does(
+    numbers: tuple[int | None, ...], believed: tuple[int, ...]
+) -> None:
+    assert untimed(FileEvidence(), *numbers) == [bool(one) for one in believed]
+
+
 def test_raw_files_come_beside_their_pictures_and_what_lacks_is_told() -> None:
     kinds = frozenset({"image/jpeg", "image/x-nikon-nef"})
     jpg = picture("D_1.JPG", NOON, "a")
@@ -174,7 +208,7 @@ class TetheredCamera:
     sent: list[Frame] = field(default_factory=list)
 
     def take(self, truth: str, at: datetime) -> Frame:
-        self.number += 1
+        self.number = self.number % 9999 + 1
         drift = timedelta(seconds=(at - NOON).total_seconds() * self.rate)
         own = at + self.off + drift
         name = f"DSC_{self.number:04d}.JPG"
@@ -205,6 +239,7 @@ def arrivals(seed: int, captures: int, cameras: int = 9) -> Counter[str]:
             lots.choice((0, 2, 3)),
             lots.random() < 0.85,
             lots.gauss(0.0, 2e-5),
+            lots.choice((0, 9950)),
         )
         for k in range(cameras)
     ]
@@ -244,6 +279,10 @@ def delivered(
     if lot < 0.04 and camera.timed:
         # Taken by hand before the shot, and fetched after it.
         frames.append(camera.take(f"early{number}", at - timedelta(seconds=lots.uniform(3, 40))))
+    if lots.random() < 0.005:
+        camera.number = 0  # another card
+    if lots.random() < 0.01:
+        return frames  # it did not fire
     frame = camera.take(str(number), at)
     fate = lots.random()
     if fate < 0.08:
