@@ -35,6 +35,7 @@ from rig.acquisition.cameras.base import (
 )
 from rig.acquisition.cameras.exif import exposure_us, read_exif
 from rig.acquisition.cameras.options import read_options
+from rig.acquisition.cameras.reach import FolderReach, answered
 from rig.acquisition.cameras.wholeness import MEDIA_TYPES, is_whole
 
 POLL_S = 0.03
@@ -171,6 +172,7 @@ class FolderCamera:
     ) -> None:
         self._watch, self._options, self._info, self._key = watch, options, info, key
         self._below = watch.root / key if options.by == "folder" else watch.root
+        self._reach = FolderReach(self._below)
         self._known: dict[Path, Stamp | None] = {}
         self._before: dict[Path, Stamp | None] = {}
         self._nodes: dict[Path, tuple[int, int]] = {}
@@ -350,8 +352,8 @@ class FolderCamera:
 
     def health(self) -> CameraHealth:
         """Whether the folder is there and how many files are on their way."""
-        there = self._below.is_dir() and not self._closed
-        problem = "" if there else "it was closed" if self._closed else "its folder is not there"
+        problem = "it was closed" if self._closed else self._reach.problem()
+        there = not problem
         counts = {**self._counts, "unfinished_files": self._unfinished()}
         return CameraHealth(there, self._armed and there, problem, counts)
 
@@ -371,7 +373,7 @@ class FolderBackend:
     def __init__(self, **options: object) -> None:
         self._options = read_options("folder", FolderOptions, options)
         root = Path(self._options.root).expanduser()
-        if not root.is_dir():
+        if not answered(root.is_dir, f"the folder {root}"):
             raise InputError(
                 "camera-option", f"there is no folder {root}", "correct the option 'root'"
             )
@@ -402,7 +404,7 @@ class FolderBackend:
 
     def open(self, camera_id: str) -> FolderCamera:
         """Open one by its name."""
-        keys = self._keys()
+        keys = answered(self._keys, f"the folder {self._watch.root}")
         if camera_id not in keys:
             raise NotFoundError(
                 "camera",
@@ -410,7 +412,11 @@ class FolderBackend:
                 f"make its folder, or name it in 'cameras'; known: {', '.join(keys) or 'none'}",
             )
         key = keys[camera_id]
-        camera = FolderCamera(self._watch, self._options, self._info(camera_id, key), key)
+        info = self._info(camera_id, key)
+        camera = answered(
+            lambda: FolderCamera(self._watch, self._options, info, key),
+            f"the folder {info.address}",
+        )
         self._open.append(camera)
         return camera
 

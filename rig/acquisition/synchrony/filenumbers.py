@@ -35,7 +35,7 @@ class FileNumbers:
         """How many pictures after the last one it is, 0 or less before it; None: unknown."""
         if not number or not self.last:
             return None
-        step, top = int(number) - int(self.last), 10 ** len(number)
+        step, top = int(number) - int(self.last), int(10 ** len(number))
         if not len(number) == len(self.last) >= _LEAST_DIGITS:
             return step
         # No camera gives the number 0.

@@ -2,12 +2,16 @@ from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from camera_rigs import jpeg
+from trigger_boxes import wait_until
 
 from common.errors import DeviceError, InputError, NotFoundError
+from rig.acquisition.cameras import reach
 from rig.acquisition.cameras.base import ArmSpec, CameraSettings, TriggerKind
 from rig.acquisition.cameras.folder import FolderBackend
 
@@ -135,6 +139,44 @@ def test_a_folder_that_goes_away_is_a_camera_that_is_gone(tmp_path: Path) -> Non
         camera.arm(SHOT)
     assert caught.value.code == "device/camera-gone"
     assert camera.health().problem == "its folder is not there"
+
+
+@pytest.fixture
+def dead_share(monkeypatch: pytest.MonkeyPatch) -> Iterator[threading.Event]:
+    """Folders answer nobody while the event is clear."""
+    alive = threading.Event()
+    alive.set()
+    for name in ("is_dir", "stat"):
+        whole = getattr(Path, name)
+
+        def wait(self: Path, whole: Callable[..., Any] = whole, **how: Any) -> Any:  # noqa: ANN401
+            alive.wait(20.0)
+            return whole(self, **how)
+
+        monkeypatch.setattr(Path, name, wait)
+    yield alive
+    alive.set()
+
+
+def test_a_dead_network_share_holds_nobody(
+    tmp_path: Path, dead_share: threading.Event, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "left").mkdir()
+    backend = folder(tmp_path)
+    camera = backend.open("left")
+    dead_share.clear()
+    began = time.monotonic()
+    for _ in range(4):
+        assert "does not answer" in camera.health().problem
+    monkeypatch.setattr(reach.answered, "__defaults__", (0.2,))
+    with pytest.raises(DeviceError, match="did not answer within"):
+        folder(tmp_path)
+    with pytest.raises(DeviceError, match="did not answer within"):
+        backend.open("left")
+    # One look that is waited for, two openings of 0.2 s; a slow machine may take as long again.
+    assert time.monotonic() - began < 5.0
+    dead_share.set()
+    wait_until(lambda: camera.health().connected)
 
 
 def test_the_box_may_fire_these_cameras(tmp_path: Path) -> None:
