@@ -103,7 +103,7 @@ def test_devices_that_another_process_has_are_refused_with_its_name(
 ) -> None:
     process = subprocess.Popen(
         [*RIGWRIGHT, "capture", "--station", str(station), "--session", str(tmp_path / "s"),
-         "--shots", "150", "--interval-ms", "200"],
+         "--shots", "150", "--interval-us", "200000"],
         stderr=subprocess.DEVNULL,
     )  # fmt: skip
     wait_for(lambda: pulses(box) >= 1)

@@ -210,6 +210,8 @@ class CameraScript:
     extra_at_start: bool = False
     free_running_s: float = 0.0
     clock_reset: bool = False
+    latch: bool = True
+    """Whether its clock can be asked."""
     unplugged: bool = False
     raw_too: bool = False
     encoded: bytes | None = None
@@ -374,7 +376,7 @@ class MemoryCamera:
     def clock_samples(self, count: int) -> Sequence[ClockSample]:
         if self.gone:
             raise DeviceError("camera-gone", "the camera is unplugged", "plug it in")
-        if self.script.timestamps is not TimestampKind.DEVICE:
+        if self.script.timestamps is not TimestampKind.DEVICE or not self.script.latch:
             return ()
         if self.script.clock_reset and self._frames:
             self._origin_ns = time.monotonic_ns()

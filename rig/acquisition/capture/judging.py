@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from common.errors import DeviceError
-from rig.acquisition.cameras.base import CameraCapabilities, ClockSample, TriggerKind
+from rig.acquisition.cameras.base import CameraCapabilities, ClockSample, TimestampKind, TriggerKind
 from rig.acquisition.capture.camerathreads import CameraThread
 from rig.acquisition.capture.collect import Collected
 from rig.acquisition.capture.firing import Firing
@@ -90,7 +90,17 @@ def _by_arrival(parts: Sequence[CameraPart]) -> list[Fault]:
     if not names:
         return []
     text = f"the pictures of {', '.join(names)} were given to the shots by order of arrival only"
+    young = [p.plan.name for p in parts if p.plan.name in names and _clock_comes_later(p)]
+    if young:
+        text += f"; the clock of {', '.join(young)} is learned from its pictures: fire twice"
     return [Fault(FaultKind.BY_ARRIVAL, text)]
+
+
+def _clock_comes_later(part: CameraPart) -> bool:
+    """Whether a camera that stamps its frames and cannot be asked the time was fired first now."""
+    stamps = part.received.capabilities.timestamps is TimestampKind.DEVICE
+    asked = part.received.clock is not None or part.received.clock_jumped
+    return stamps and not asked and part.plan.output is None
 
 
 def _stopped(firing: Firing, shots: int) -> list[Fault]:

@@ -198,7 +198,8 @@ def _strays(received: CameraFrames, strays: list[Exposure], first_window: float)
         else:
             text = (
                 f"{received.camera}: a picture lies {_off(received, e):.1f} ms after the shot "
-                "before it, where no shot puts it; it is left out"
+                "before it, where no shot puts it; it is left out. No shot asked for it: look "
+                "whether the camera runs freely"
             )
             faults.append(Fault(FaultKind.EXTRA, text, received.camera))
     return faults
@@ -296,7 +297,11 @@ def _order_problem(received: CameraFrames, rest: Sequence[Exposure]) -> Fault | 
         text = f"{received.camera}: {len(rest)} of {wanted} pictures came{which}"
         return Fault(FaultKind.MISSING, text, received.camera, shot)
     if len(rest) > wanted:
-        text = f"{received.camera}: {len(rest)} pictures came for {wanted} shots; none is taken"
+        text = (
+            f"{received.camera}: {len(rest)} pictures came for {wanted} "
+            f"{'shot' if wanted == 1 else 'shots'}; none is taken. No shot asked for the others: "
+            "look whether the camera runs freely, at its trigger mode and its cable"
+        )
         return Fault(FaultKind.AMBIGUOUS, text, received.camera)
     for trigger_time, e in zip(received.trigger_times, rest, strict=True):
         if (

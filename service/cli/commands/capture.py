@@ -40,7 +40,10 @@ def capture(
         ),
     ] = None,
     shots: Annotated[int, typer.Option(min=1, help="Shots in a burst.")] = 1,
-    interval_ms: Annotated[float, typer.Option(min=0.0, help="From shot to shot.")] = 0.0,
+    interval_us: Annotated[
+        float, typer.Option(min=0.0, help="From shot to shot, in microseconds.")
+    ] = 0.0,
+    interval_ms: Annotated[float, typer.Option(min=0.0, hidden=True)] = 0.0,
     allow_partial: Annotated[
         bool | None,
         typer.Option(
@@ -79,6 +82,9 @@ def capture(
     from service.kinds.rigs import CaptureRequest
 
     with one_line_errors(), ExitStack() as stack:
+        if interval_us and interval_ms:
+            raise InputError("interval", "the interval is given twice", "give --interval-us alone")
+        apart_us = interval_us or 1e3 * interval_ms
         if count > 1 and capture_id is not None:
             raise InputError(
                 "capture-id-count",
@@ -91,7 +97,7 @@ def capture(
                 subject=subject,
                 operator=operator,
                 shots=shots,
-                interval_us=interval_ms * 1e3,
+                interval_us=apart_us,
                 allow_partial=allow_partial,
             )
             for _ in range(count)
@@ -102,7 +108,7 @@ def capture(
         if dry_run:
             dry = opened.dry_run(
                 shots=shots,
-                interval_us=interval_ms * 1e3,
+                interval_us=apart_us,
                 allow_partial=allow_partial,
                 progress=report,
                 cancel=cancel,

@@ -41,6 +41,7 @@ class OpencvDriver:
         self._books = threading.Lock()
         self._skip = 0
         self._last = b""
+        self._size = (0, 0)
 
     def open(self, camera_id: str) -> Mapping[str, Any]:
         """Open the source."""
@@ -163,6 +164,7 @@ class OpencvDriver:
             return {"arrived_host_ns": arrived_ns, "status": "incomplete"}, b""
         height, width = image.shape[:2]
         if self._live:
+            self._require_size(width, height)
             self._require_alive(image)
         header = {
             "arrived_host_ns": arrived_ns,
@@ -172,6 +174,14 @@ class OpencvDriver:
             "pixel_format": "BGR8" if image.ndim == 3 else "Mono8",
         }
         return header, image.tobytes()
+
+    def _require_size(self, width: int, height: int) -> None:
+        """Notice a stream that gives pictures of another size than it did."""
+        was, self._size = self._size, (width, height)
+        if was not in ((0, 0), self._size):
+            raise _gone(
+                f"its pictures are {width} x {height} pixels now, and were {was[0]} x {was[1]}"
+            )
 
     def _require_alive(self, image: Any) -> None:  # noqa: ANN401  (H, W) or (H, W, 3), 8 bits
         """Notice a stream that gives the same picture for ever."""

@@ -13,6 +13,7 @@ from camera_rigs import CameraRig, Webcam, files_rig
 from common.errors import DeviceError, NotFoundError
 from rig.acquisition.cameras.base import ArmSpec, CameraDevice, TimestampKind, TriggerKind
 from rig.acquisition.cameras.opencv import OpencvBackend, stable_names
+from rig.acquisition.cameras.workers.opencv_driver import OpencvDriver
 
 RATE_HZ = 50.0
 
@@ -128,3 +129,20 @@ def test_a_stream_that_freezes_is_named(monkeypatch: pytest.MonkeyPatch) -> None
     finally:
         backend.close()
         webcam.stop()
+
+
+def test_a_stream_that_changes_its_size_is_named() -> None:
+    sizes = iter([(48, 64), (48, 64), (24, 32)])
+
+    class Stream:
+        def retrieve(self) -> tuple[bool, np.ndarray]:
+            height, width = next(sizes)
+            return True, np.random.default_rng(0).integers(0, 200, (height, width, 3), np.uint8)
+
+    driver = OpencvDriver({"source": 0})
+    driver._capture = Stream()
+    driver._retrieve(1)
+    driver._last = b""
+    assert driver._retrieve(2)[0]["width"] == 64
+    with pytest.raises(DeviceError, match="are 32 x 24 pixels now, and were 64 x 48"):
+        driver._retrieve(3)

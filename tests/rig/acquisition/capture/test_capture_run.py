@@ -339,6 +339,20 @@ def test_cameras_that_tell_nothing_are_paired_by_arrival_and_not_believed(
     assert any("no usable time stamps of cam01" in text for text in record.verdict.lacking)
 
 
+@pytest.mark.parametrize(
+    ("output", "trigger"), [(None, TriggerKind.SOFTWARE), (2, TriggerKind.EDGE)]
+)
+def test_a_clock_that_is_learned_from_pictures_says_fire_twice(
+    bench: BenchMaker, output: int | None, trigger: TriggerKind
+) -> None:
+    station = with_camera(memory_station(), "cam02", output=output)
+    made = bench(station, {"cam02": CameraScript(latch=False, trigger=trigger)})
+    record = made.rig.capture(made.session, "smile").record
+    told = [fault.text for fault in record.faults if fault.kind == "by-arrival"]
+    assert len(told) == 1
+    assert told[0].endswith("fire twice") == (output is None)
+
+
 def test_raw_files_are_filed_beside_the_pictures(bench: BenchMaker) -> None:
     station = with_policy(memory_station(), settle_s=0.05)
     made = bench(station, {"cam01": CameraScript(raw_too=True)})

@@ -240,6 +240,18 @@ def test_without_stamps_the_order_counts_and_says_so() -> None:
     assert kinds(lost) == {FaultKind.MISSING}
 
 
+def test_one_picture_that_no_shot_asked_for_is_called_that() -> None:
+    one, two, three = burst()
+    stray = frame(START + round(2.6 * INTERVAL_NS), 3)
+    timed = pair(received([one, two, three, stray]))
+    assert truths(timed) == ALL_RIGHT
+    assert any("whether the camera runs freely" in fault.text for fault in timed.faults)
+    frames = [replace(f, device_ns=None, counter=None) for f in (one, two, three, stray)]
+    mute = pair(received(frames, capabilities=MUTE, clock=None))
+    assert not mute.pairs
+    assert "4 pictures came for 3 shots; none is taken. No shot asked for" in mute.faults[0].text
+
+
 def test_without_stamps_a_counter_gap_stops_the_guess() -> None:
     """Three pictures for three shots, but one was lost and one nobody asked for."""
     mute = replace(MUTE, frame_counter=True)
