@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from geometry.arrays import Floats, frozen
+from geometry.arrays import Bools, Floats, frozen
 
 INTERIOR_NAMES = ("f", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "b1")
 """Interior parameters in their order everywhere: px, px, px, then without unit."""
@@ -24,6 +24,7 @@ INTERIOR_NAMES = ("f", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "b1")
 NO_DISTORTION = frozen(np.zeros(5))
 
 _STEPS = 60
+_HALVINGS = 40
 _FOUND = 1e-14
 _ON_THE_SHEET = 1e-9
 
@@ -104,7 +105,22 @@ def undistort(distorted: Floats, distortion: Floats) -> Floats:
     target = np.asarray(distorted, dtype=np.float64).reshape(-1, 2)
     if not np.any(distortion):
         return np.array(distorted, dtype=np.float64)
-    found = target.copy()
+    fold = fold_radius(distortion)
+    found, good = _inverse_from(target, target, distortion, fold)
+    again = np.flatnonzero(~good)
+    if len(again):
+        # A lens that spreads its edge has targets beyond its own fold: from there Newton's steps
+        # lead away. The radial part alone has one answer within the fold, which is near enough.
+        start = _radially(target[again], distortion, fold)
+        found[again], good[again] = _inverse_from(target[again], start, distortion, fold)
+    return np.where(good[:, None], found, np.nan).reshape(np.shape(distorted))
+
+
+def _inverse_from(
+    target: Floats, start: Floats, distortion: Floats, fold: float
+) -> tuple[Floats, Bools]:
+    """Inverse (n, 2) by Newton's method from a start (n, 2), and whether it is one (n,)."""
+    found = start.copy()
     left = target - distort(found, distortion)
     share = np.ones(len(found))
     open_ = np.flatnonzero(_size(left) > _FOUND)
@@ -121,9 +137,23 @@ def undistort(distorted: Floats, distortion: Floats) -> Floats:
     own = distort_partials(found, distortion)[0]
     upright = own[:, 0, 0] * own[:, 1, 1] - own[:, 0, 1] * own[:, 1, 0] >= -1e-6
     # Decentring moves the fold by its own small share; other sheets lie far beyond.
-    within = np.hypot(found[:, 0], found[:, 1]) <= 1.1 * fold_radius(distortion)
-    good = upright & within & (_size(left) <= _ON_THE_SHEET)
-    return np.where(good[:, None], found, np.nan).reshape(np.shape(distorted))
+    within = np.hypot(found[:, 0], found[:, 1]) <= 1.1 * fold
+    return found, upright & within & (_size(left) <= _ON_THE_SHEET)
+
+
+def _radially(target: Floats, distortion: Floats, fold: float) -> Floats:
+    """Inverse (n, 2) of the radial part within the fold; the fold where there is none."""
+    k1, k2, _, _, k3 = distortion
+    wanted = np.hypot(target[:, 0], target[:, 1])
+    low = np.zeros(len(target))
+    # Without a fold the polynomial grows for ever, and is at least a share of x beyond 1.
+    high = np.full(len(target), fold) if np.isfinite(fold) else 10.0 * np.maximum(wanted, 1.0)
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        r2 = middle * middle
+        below = middle * (1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))) < wanted
+        low, high = np.where(below, middle, low), np.where(below, high, middle)
+    return target * (low / np.maximum(wanted, 1e-300))[:, None]
 
 
 def _size(vectors: Floats) -> Floats:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from common.errors import InputError
@@ -167,6 +167,7 @@ coordinate = st.floats(-1.0, 1.0)
     st.floats(-5e-3, 5e-3),
     st.floats(-0.05, 0.05),
 )
+@example((1.0, 1.0), 0.25, 0.0, 0.0, 0.0, -0.015625)  # its image is beyond its own fold
 @settings(max_examples=200, deadline=None)
 def test_the_inverse_is_right_or_refused(
     given_at: tuple[float, float], k1: float, k2: float, p1: float, p2: float, k3: float
