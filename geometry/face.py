@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import median_filter
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
@@ -13,7 +12,9 @@ from scipy.spatial import cKDTree
 from common.errors import InputError
 from geometry.arrays import Bools, Floats, frozen
 from geometry.frames import FORWARD_RIG
+from geometry.locating.finding import SURE, locate_face
 from geometry.raycast import Occluder
+from geometry.sampling import spread
 from geometry.scan import Scan
 from geometry.surface import SurfacePoints
 
@@ -23,12 +24,6 @@ RADIUS_MM = 95.0
 MAX_NORMAL_DEG = 65.0
 """Default largest angle between a point's normal and the direction of the face."""
 
-_CELL_MM = 2.0
-_NOSE_RING_MM = 22.0
-_CHEEK_MM = 50.0
-_ABOVE_MM = 45.0
-_MIN_DROP_MM = 5.0
-_MIN_SHARPNESS = 0.26
 _LINK_MM = 4.0
 _LOOK_DEG = 60.0
 _LOOK_STEP_DEG = 15.0
@@ -95,79 +90,19 @@ class FaceRegion:
     excluded_share: float
 
 
-def _depth_map(scan: Scan, occluder: Occluder) -> tuple[Floats, Floats, Floats]:
-    """Depth y (nz, nx) of the surface seen from the front, NaN for none, with its x and z."""
-    low, high = scan.vertices_mm.min(axis=0), scan.vertices_mm.max(axis=0)
-    x = np.arange(low[0], high[0] + _CELL_MM, _CELL_MM)
-    z = np.arange(low[2], high[2] + _CELL_MM, _CELL_MM)
-    grid_x, grid_z = np.meshgrid(x, z)
-    start = low[1] - 10.0
-    origins = np.stack([grid_x.ravel(), np.full(grid_x.size, start), grid_z.ravel()], axis=1)
-    triangle, distance = occluder.first_hits(origins, np.tile([0.0, 1.0, 0.0], (len(origins), 1)))
-    depth = np.where(triangle >= 0, start + distance, np.nan).reshape(grid_x.shape)
-    return depth, x, z
-
-
-def _shifted(depth: Floats, dx_mm: float, dz_mm: float) -> Floats:
-    """The map as seen from a place ``dx``, ``dz`` further, NaN beyond its edge."""
-    out = np.full_like(depth, np.nan)
-    kx, kz = round(dx_mm / _CELL_MM), round(dz_mm / _CELL_MM)
-    rows, columns = depth.shape
-    if abs(kx) >= columns or abs(kz) >= rows:
-        return out
-    source = depth[max(0, kz) : rows + min(0, kz), max(0, kx) : columns + min(0, kx)]
-    out[max(0, -kz) : rows + min(0, -kz), max(0, -kx) : columns + min(0, -kx)] = source
-    return out
-
-
-def _nose_score(depth: Floats) -> Floats:
-    """How much each place of the map is like a nose tip; -inf where it cannot be one.
-
-    A nose tip stands out by several millimetres against both sides, above and below, more
-    sharply than the face as a whole does against the cheeks: a ball does not.
-    """
-
-    def drop(dx: float, dz: float) -> Floats:
-        return _shifted(depth, dx, dz) - depth
-
-    near = [drop(-_NOSE_RING_MM, 0.0), drop(_NOSE_RING_MM, 0.0)]
-    cheeks = [drop(-_CHEEK_MM, 0.0), drop(_CHEEK_MM, 0.0)]
-    upright = [drop(0.0, _NOSE_RING_MM), drop(0.0, -_NOSE_RING_MM)]
-    face = [drop(0.0, _ABOVE_MM), drop(0.0, -_ABOVE_MM)]
-    with np.errstate(invalid="ignore"):
-        sides = np.minimum(*near)
-        sharpness = (near[0] + near[1]) / np.maximum(cheeks[0] + cheeks[1], 1e-9)
-        possible = (
-            (sides > _MIN_DROP_MM)
-            & (np.minimum(*upright) > 0.4 * _MIN_DROP_MM)
-            & (np.minimum(*cheeks) > 10.0)
-            & (np.maximum(*cheeks) < 100.0)
-            & np.isfinite(face[0] + face[1])
-            & (np.maximum(*face) < 60.0)
-            & (sharpness > _MIN_SHARPNESS)
-        )
-        score = sides + 0.5 * np.minimum(*upright) - 0.5 * np.abs(near[0] - near[1])
-    return np.where(possible, score, -np.inf)
-
-
-def nose_tip(scan: Scan, occluder: Occluder) -> Floats:
+def nose_tip(scan: Scan) -> Floats:
     """The nose tip (3,) in the rig frame. Raises :class:`InputError` when there is no face."""
-    depth, x, z = _depth_map(scan, occluder)
-    seen = np.isfinite(depth)
-    filled = np.where(seen, depth, np.nanmax(depth) if seen.any() else 0.0)
-    smooth = np.where(seen, median_filter(filled, 3), np.nan)
-    score = _nose_score(smooth)
-    if not np.isfinite(score).any():
+    if scan.face is not None:
+        return scan.face.nose_tip_mm
+    found = locate_face(spread(scan.vertices_mm, scan.faces, scan.normals), np.eye(3))
+    if found is None or found.confidence < SURE:
         raise InputError(
             "face-not-found",
-            "no face was found in the scan",
-            "check its units, up and front, or give the region as a box or a sphere",
+            "no face was found for certain in the scan",
+            "check its units, up and front, give nose_tip, left_eye and right_eye, or give the "
+            "region as a box or a sphere",
         )
-    row, column = np.unravel_index(int(np.argmax(score)), score.shape)
-    about = np.hypot(*np.meshgrid(x - x[column], z - z[row])) <= 8.0
-    candidates = np.where(about & seen, smooth, np.inf)
-    row, column = np.unravel_index(int(np.argmin(candidates)), candidates.shape)
-    return np.array([x[column], smooth[row, column], z[row]])
+    return found.nose_tip_mm
 
 
 def _look_directions() -> Floats:
@@ -213,7 +148,7 @@ def find_face(
     Raises :class:`InputError` when no face is found.
     """
     occluder = scan.occluder()
-    tip = nose_tip(scan, occluder)
+    tip = nose_tip(scan)
     near = np.linalg.norm(samples.points_mm - tip, axis=1) <= radius_mm
     facing = samples.normals @ FORWARD_RIG >= np.cos(np.radians(max_normal_deg))
     if not (near & facing).any():

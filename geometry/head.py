@@ -135,6 +135,22 @@ def _grid(measures: Measures) -> tuple[Floats, Floats, Floats]:
     )
 
 
+def head_field(shape: HeadShape) -> Callable[[Floats], Floats]:
+    """Signed distance (N,), about mm, of points (N, 3) of the rig frame to a smooth head."""
+    measures = _measures(shape)
+    size = _stretch(shape)
+
+    def field(points: Floats) -> Floats:
+        return np.asarray(head_distance(points / size, measures) * size.min())
+
+    return field
+
+
+def _stretch(shape: HeadShape) -> Floats:
+    size = np.array([shape.width_mm, shape.depth_mm, shape.height_mm])
+    return np.asarray(size / np.array(TEMPLATE_SIZE_MM))
+
+
 def synthetic_head(shape: HeadShape | None = None, seed: int = 0) -> Scan:
     """A watertight head in the rig frame, its origin at mid height between the ears.
 
@@ -151,10 +167,7 @@ def synthetic_head(shape: HeadShape | None = None, seed: int = 0) -> Scan:
     axes = _grid(measures)
     vertices, faces = largest_piece(*surface_nets(unambiguous(grid_values(field, axes)), axes))
     vertices = settle(vertices, field)
-    size = np.array([chosen.width_mm, chosen.depth_mm, chosen.height_mm]) / np.array(
-        TEMPLATE_SIZE_MM
-    )
-    vertices = vertices * size
+    vertices = vertices * _stretch(chosen)
     note = ScanNote("inferred", f"synthetic head, seed {seed}: millimetres, in the rig frame")
     return Scan(vertices, faces, vertex_normals(vertices, faces), (note,))
 
@@ -172,7 +185,7 @@ def _relief(seed: int) -> Callable[[Floats], Floats]:
     return field
 
 
-_SPREAD_MM = {
+SPREAD_MM = {
     "width_mm": 5.5,
     "height_mm": 8.0,
     "depth_mm": 7.0,
@@ -200,7 +213,7 @@ def random_head_shape(seed: int) -> HeadShape:
     base = HeadShape()
     overall = rng.normal()
     values = {}
-    for name, spread in _SPREAD_MM.items():
+    for name, spread in SPREAD_MM.items():
         # Half of the variance is common: large heads have large noses, mostly.
         draw = np.sqrt(0.5) * overall + np.sqrt(0.5) * rng.normal()
         low, high = RANGES_MM[name]

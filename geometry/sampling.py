@@ -41,6 +41,28 @@ def surface_samples(scan: Scan, count: int, seed: int) -> SurfacePoints:
     return SurfacePoints(points, normals)
 
 
+def spread(vertices: Floats, faces: Ints, normals: Floats, count: int = 25_000) -> SurfacePoints:
+    """About ``count`` points spread evenly by area in the unit of ``vertices`` (V, 3).
+
+    Normals are the faces' own. A cloud gives some of its points, with their ``normals`` (V, 3).
+    """
+    if len(faces) == 0:
+        step = max(1, len(vertices) // (2 * count))
+        return SurfacePoints(vertices[::step], normals[::step])
+    rng = np.random.default_rng(0)
+    corners = vertices[faces]
+    doubled = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = np.linalg.norm(doubled, axis=1)
+    total = np.cumsum(area)
+    face = np.searchsorted(total, (np.arange(count) + 0.5) / count * total[-1])
+    u, v = rng.random((2, count))
+    flip = u + v > 1.0
+    u, v = np.where(flip, 1.0 - u, u), np.where(flip, 1.0 - v, v)
+    weights = np.stack([1.0 - u - v, u, v], axis=1)
+    points = np.einsum("nk,nkm->nm", weights, corners[face])
+    return SurfacePoints(points, doubled[face] / area[face, None])
+
+
 def _voxels(points_mm: Floats, voxel_mm: float) -> tuple[Ints, int]:
     """The number of each point's voxel (n,), and how many voxels are occupied."""
     cell = np.floor((points_mm - points_mm.min(axis=0)) / voxel_mm).astype(np.int64)

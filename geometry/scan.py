@@ -28,11 +28,29 @@ class ScanNote:
 
 
 @dataclass(frozen=True, eq=False)
+class FacePlace:
+    """Where the face is: ``nose_tip_mm`` (3,) in the rig frame.
+
+    ``axes_rig`` (3, 3) has the face's own axes as rows: to the subject's left, into the head, up;
+    near the identity for a face that looks straight at the cameras. ``confidence`` is 0 to 1.
+    """
+
+    nose_tip_mm: Floats
+    axes_rig: Floats
+    confidence: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "nose_tip_mm", frozen(self.nose_tip_mm))
+        object.__setattr__(self, "axes_rig", frozen(self.axes_rig))
+
+
+@dataclass(frozen=True, eq=False)
 class Scan:
     """``vertices_mm`` (V, 3) in the rig frame with outward unit ``normals`` (V, 3).
 
     ``faces`` (F, 3) are wound counter-clockwise seen from outside; none make it a point cloud.
     ``rig_from_file`` (4, 4) maps homogeneous coordinates of the file to the rig frame, mm.
+    ``face`` is None when none was looked for or found for certain.
     Raises :class:`InputError` when the arrays do not fit together.
     """
 
@@ -41,6 +59,7 @@ class Scan:
     normals: Floats
     notes: tuple[ScanNote, ...] = ()
     rig_from_file: Floats = field(default_factory=lambda: np.eye(4))
+    face: FacePlace | None = None
 
     def __post_init__(self) -> None:
         vertices, normals = frozen(self.vertices_mm), frozen(self.normals)

@@ -13,7 +13,9 @@ from geometry.scan import ScanNote
 MM_PER_UNIT = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "inch": 25.4}
 """Millimetres per unit by the unit's short name."""
 
-_NAMES = {"mm": "millimetres", "cm": "centimetres", "m": "metres", "inch": "inches"}
+UNIT_NAMES = {"mm": "millimetres", "cm": "centimetres", "m": "metres", "inch": "inches"}
+"""The units in full."""
+
 _HEAD_MM = (180.0, 420.0)
 _BUST_MM = (300.0, 700.0)
 _IMPOSSIBLE_MM = (25.0, 5000.0)
@@ -68,7 +70,7 @@ def mm_per_unit(samples: Floats, declared: str | None) -> tuple[float, ScanNote]
     for unit in [declared] * (declared is not None) + list(MM_PER_UNIT):
         if unit is not None and low <= size * MM_PER_UNIT[unit] <= high:
             basis = "as the file says" if unit == declared else "from the size of the head"
-            return MM_PER_UNIT[unit], ScanNote("inferred", f"units: {_NAMES[unit]}, {basis}")
+            return MM_PER_UNIT[unit], ScanNote("inferred", f"units: {UNIT_NAMES[unit]}, {basis}")
     scale = _STANDARD_HEAD_MM / (head.crown - head.lower_end)
     text = (
         f"units unknown: scaled by {scale:.4g} so that the head is {_STANDARD_HEAD_MM:.0f} mm "

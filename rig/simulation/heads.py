@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from common.errors import InputError, NotFoundError
 from geometry.arrays import Floats, Ints
 from geometry.cleaning import unique_rows
-from geometry.reading import ScanOptions, read_scan
+from geometry.reading import read_scan
+from geometry.scanoptions import ScanOptions
 from rig.simulation.mesh import TexturedMesh
 from rig.simulation.settings import HeadSettings
 from rig.simulation.skin import painted_head

@@ -8,7 +8,7 @@ from common.errors import InputError
 from geometry.camera import Camera, RigCamera
 from geometry.frames import Pose
 from geometry.preparation import SubjectOptions
-from geometry.reading import ScanOptions
+from geometry.scanoptions import ScanOptions
 from rig.specification.contradictions import check_limits
 from solver.limits import Limits
 

@@ -25,6 +25,7 @@ from service.cli.commands.plan import plan
 from service.cli.commands.practice import practice
 from service.cli.commands.reconstruct import reconstruct
 from service.cli.commands.rig import rig
+from service.cli.commands.scan import scan
 from service.cli.commands.serve import serve
 from service.cli.commands.sessions import sessions
 from service.cli.commands.targets import targets
@@ -62,7 +63,7 @@ def _options(
 
 
 for command in (
-    *(demo, design, evaluate, plan, catalogue, export),
+    *(demo, scan, design, evaluate, plan, catalogue, export),
     *(targets, calibrate, check, accept),
     *(reconstruct, compare),
     *(practice, capture, cameras, fake_trigger, serve),

@@ -16,8 +16,9 @@ from hypothesis import strategies as st
 from scanfiles import plain_head
 
 from common.errors import InputError, NotFoundError, RigwrightError, TooLargeError
-from geometry.reading import ScanOptions, read_scan
+from geometry.reading import read_scan
 from geometry.scan import Scan
+from geometry.scanoptions import ScanOptions
 from geometry.sniffing import KINDS
 
 OBJECT = ScanOptions(subject="object", units="mm")

@@ -88,7 +88,7 @@ MOUNTS = {
     "a head without roll": (
         SLOT + 'head = "generic-pan-tilt"',
         rolled,
-        r"roll 0.0: choose (head|another mount)",
+        "roll 0.0: choose head ",
     ),
     "a plate under a ceiling": ('kind = "plate"', from_above, "choose a frame or an arc"),
     "too small an arc": (ARC + "radius_mm = 50.0", cameras, "or more, or leave it out"),

@@ -16,7 +16,7 @@ from service.kinds.queued import QUEUED
 from service.tasks import registry
 
 SEAM = ("api", "cli", "jobs", "kinds", "stations", "tasks")
-JSON_IS_THEIRS = ("service/api/app.py", "service/api/responses.py")
+JSON_IS_THEIRS = ("service/api/document.py", "service/api/responses.py")
 """They write the OpenAPI document."""
 
 ASKED = ("request", "result", "body", "content")

@@ -31,7 +31,8 @@ _MISFIT = 0.03
 """How far a bit's share may be from what the exposure would give; the reader's floor is 0.004."""
 _CONTRADICTION = 3.5
 """Standard deviations of a bit's share, which know of unequal LEDs and are generous about them."""
-_LENGTH = 0.35
+_LENGTH_SHARE = 0.35
+"""By what share an exposure may differ in length from the one that was asked for."""
 _CAUSES = (
     "clear what covers or lights the LEDs, see that each can be lit and go out, and hold the "
     "board so that its rows run along a rolling shutter's"
@@ -112,7 +113,7 @@ def require_consistent(
     if nominal_length_ticks is None:
         return
     off = abs(found.length_ticks / nominal_length_ticks - 1.0)
-    if off > _LENGTH + _SURE * found.length_sigma_ticks / nominal_length_ticks:
+    if off > _LENGTH_SHARE + _SURE * found.length_sigma_ticks / nominal_length_ticks:
         raise InputError(
             "board-unclear",
             f"the timing board shows an exposure {found.length_ticks / nominal_length_ticks:.2f} "

@@ -2,18 +2,28 @@
 
 from __future__ import annotations
 
-from typing import Literal, Self
+from typing import Any, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
-from common.files.strict import StrictModel, Vector
+from common.files.strict import Matrix, StrictModel, Vector
 from geometry.face import RegionBox, RegionSphere
 from geometry.preparation import SubjectOptions
-from geometry.reading import ScanOptions
+from geometry.scanoptions import ScanOptions
 
 Axis = Literal["auto", "+x", "-x", "+y", "-y", "+z", "-z"]
 Unit = Literal["auto", "mm", "cm", "m", "inch"]
+
+
+def _tuples(value: Any) -> Any:  # noqa: ANN401 - whatever a section holds
+    """Lists as tuples, so that options of a scan stay frozen."""
+    return tuple(_tuples(one) for one in value) if isinstance(value, list | tuple) else value
+
+
+def _lists(value: Any) -> Any:  # noqa: ANN401 - whatever an option holds
+    """Tuples as lists, as files have them."""
+    return [_lists(one) for one in value] if isinstance(value, tuple) else value
 
 
 class ScanSection(StrictModel):
@@ -29,14 +39,31 @@ class ScanSection(StrictModel):
         default="head", description='`"head"` expects a head\'s size; `"object"` takes anything.'
     )
 
+    rotation_file_to_rig: Matrix | None = Field(
+        default=None,
+        description="Three rows of the rotation from the file's axes to the rig's, instead of up "
+        "and front, for a scan that stands askew.",
+    )
+    nose_tip: Vector | None = Field(
+        default=None,
+        description="The nose tip in the file's coordinates, where the face is not found.",
+    )
+    left_eye: Vector | None = Field(
+        default=None, description="Outer corner of the subject's left eye, likewise."
+    )
+    right_eye: Vector | None = Field(
+        default=None, description="Outer corner of the subject's right eye, likewise."
+    )
+
     def to_options(self) -> ScanOptions:
         """The options of the scan reader."""
-        return ScanOptions(**self.model_dump())
+        given = {key: _tuples(value) for key, value in self.model_dump().items()}
+        return ScanOptions(**given)
 
     @classmethod
     def from_options(cls, options: ScanOptions) -> Self:
         """The section that describes ``options``."""
-        return cls.model_validate({key: getattr(options, key) for key in cls.model_fields})
+        return cls.model_validate({key: _lists(getattr(options, key)) for key in cls.model_fields})
 
 
 class BoxRegion(StrictModel):
