@@ -289,7 +289,10 @@ class TestOnTheCommandLine:
         assert done.returncode == 0, done.stderr
         document = json.loads(done.stdout)
         assert (document["result"]["cameras"], document["result"]["seed"]) == (4, 1)
-        assert {Path(path).name for path in document["files"].values()} == set(FILE_NAMES)
+        assert {Path(path).name for path in document["files"].values()} == {
+            *FILE_NAMES,
+            "scan.json",
+        }
         assert document["constraints"]
         assert " % " in done.stderr
 

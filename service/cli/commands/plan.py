@@ -96,6 +96,9 @@ def plan(
     if why:
         sys.stderr.write(f"rigwright: {why}\n")
         raise typer.Exit(EXIT_INFEASIBLE)
+    words = caution(result)
+    if words:
+        sys.stderr.write(f"rigwright: note: {words}\n")
 
 
 def _asked(design: Path | None, rig: Path | None, scan: Path | None) -> Path:
@@ -124,12 +127,17 @@ def why_not(result: PlanResult) -> str:
             f"{first.other} {what} {first.one}{f', and {more} more' if more else ''}; the plan "
             "was written, but cannot be built so: try another mount or other zones"
         )
-    if not result.price.built.feasible:
-        return (
-            f"as it is set, the rig breaks limits ({_broken(result.price.built)}) that the design "
-            "keeps; the plan was written: try a mount with finer settings"
-        )
     return ""
+
+
+def caution(result: PlanResult) -> str:
+    """What is to be known of a rig that can be built; empty when it keeps every limit as set."""
+    if result.price.built.feasible:
+        return ""
+    return (
+        f"as it is set, the rig breaks limits a little that the design keeps "
+        f"({_broken(result.price.built)}); a mount with finer settings would keep them"
+    )
 
 
 def _broken(network: PlanNetwork) -> str:

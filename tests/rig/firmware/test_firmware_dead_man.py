@@ -45,6 +45,6 @@ def test_no_edge_after_the_dead_man_s_time(box: FirmwareSim) -> None:
 
 
 @pytest.mark.slow
-def test_no_edge_after_the_dead_man_s_time_at_200_moments(box: FirmwareSim) -> None:
-    late = max(silenced(box, 200, seed=2)) - DEAD_MAN_MS
+def test_no_edge_after_the_dead_man_s_time_at_200_moments(one_box: FirmwareSim) -> None:
+    late = max(silenced(one_box, 200, seed=2)) - DEAD_MAN_MS
     assert late <= LATE_BY_MS
