@@ -99,8 +99,10 @@ def test_a_knocked_camera_is_named(tmp_path: Path) -> None:
         assert [(f["kind"], f["subjects"]) for f in knocked["findings"]] == [
             ("camera-moved", ["cam03"])
         ]
-        # 0.1 mm at 0.9 m shifts what the camera says of a point at the subject by as much.
-        assert knocked["findings"][0]["effect_mm"] == pytest.approx(KNOCK_MM, rel=0.7)
+        # A point that cam03 and its neighbour alone see moves along their rays by the knock over
+        # their base/height ratio, 233 mm at 905 mm; one that all four see by a quarter of it.
+        effect_mm = knocked["findings"][0]["effect_mm"]
+        assert KNOCK_MM / 4.0 < effect_mm < 1.2 * KNOCK_MM * 905.0 / 233.0
 
         page = client.get(f"{own}/history")
         assert page.status_code == 200
