@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -48,21 +47,34 @@ def run_scan_command(
     scan_file: Path, rig: Path | None, picture: Path | None, *, as_json: bool
 ) -> None:
     """Read ``scan_file`` as ``rig`` says and show what was understood."""
+    from common.files.writing import write_whole
     from service.cli.output import print_json
-    from service.cli.running import one_line_errors, run_task
+    from service.cli.running import one_line_errors, require_files, run_task
     from service.kinds.imports import SCAN_IMPORT, ScanImportRequest
 
     with one_line_errors(), tempfile.TemporaryDirectory(prefix="rigwright-") as temporary:
+        require_files([scan_file, *([rig] if rig else [])])
+        _refuse_what_is_there(picture)
         folder = Path(temporary) / "files"
         folder.mkdir()
         request = ScanImportRequest(options=_options(rig), picture=picture is not None)
         found = run_task(SCAN_IMPORT, request, {"upload": scan_file}, folder)
         if picture is not None:
-            shutil.copyfile(folder / "scan.png", picture)
+            write_whole(picture, (folder / "scan.png").read_bytes())
         if as_json:
             print_json(found.model_dump(mode="json"))
         else:
             _print(found, picture)
+
+
+def _refuse_what_is_there(picture: Path | None) -> None:
+    """Before the scan is read: a picture replaces no file, least of all the scan itself."""
+    from common.errors import ConflictError
+
+    if picture is not None and picture.exists():
+        raise ConflictError(
+            "file-exists", f"{picture} is there already", "give another name for the picture"
+        )
 
 
 def _options(rig: Path | None) -> ScanSection:
