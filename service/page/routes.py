@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 
-from fastapi import APIRouter, Request, Response
+from fastapi import APIRouter, Response
 
 from common.errors import NotFoundError
 
@@ -29,11 +28,10 @@ POLICY = (
 
 @dataclass(frozen=True)
 class Asset:
-    """One shipped file; ``etag`` changes with its content."""
+    """One shipped file."""
 
     content: bytes
     media_type: str
-    etag: str
 
 
 @cache
@@ -43,30 +41,26 @@ def assets() -> dict[str, Asset]:
     for entry in files("service.page.assets").iterdir():
         suffix = "." + entry.name.rpartition(".")[2]
         if suffix in _TYPES:
-            content = entry.read_bytes()
-            etag = f'"{hashlib.sha256(content).hexdigest()[:32]}"'
-            found[entry.name] = Asset(content, _TYPES[suffix], etag)
+            found[entry.name] = Asset(entry.read_bytes(), _TYPES[suffix])
     return found
 
 
 @router.get("/")
-def read_page(request: Request) -> Response:
+def read_page() -> Response:
     """The page itself."""
-    return _answer("index.html", request)
+    return _answer("index.html")
 
 
 @router.get("/page/{name}")
-def read_asset(request: Request, name: str) -> Response:
+def read_asset(name: str) -> Response:
     """A part of the page."""
-    return _answer(name, request)
+    return _answer(name)
 
 
-def _answer(name: str, request: Request) -> Response:
+def _answer(name: str) -> Response:
     asset = assets().get(name)
     if asset is None:
         raise NotFoundError("path", f"the page has no part {name!r}", "begin at /")
     # Asked for again each time: a service that was brought up to date shows its new page at once.
-    headers = {"ETag": asset.etag, "Cache-Control": "no-cache", "Content-Security-Policy": POLICY}
-    if asset.etag in request.headers.get("if-none-match", ""):
-        return Response(status_code=304, headers=headers)
+    headers = {"Cache-Control": "no-cache", "Content-Security-Policy": POLICY}
     return Response(asset.content, media_type=asset.media_type, headers=headers)

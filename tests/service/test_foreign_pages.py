@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import httpx2
 import pytest
+from browsers import chromium
 from prometheus_client.parser import text_string_to_metric_families
 from service_helpers import StartServer, wait_for
 from stations import write_station
@@ -18,13 +19,9 @@ from stations import write_station
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
-CHROMIUM = Path("/usr/bin/chromium")
 REBOUND = "rebound.example"
-FLAGS = [
-    *("--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking"),
-    # A name of the page's own that leads to this machine.
-    f"--host-resolver-rules=MAP {REBOUND} 127.0.0.1",
-]
+# A name of the page's own that leads to this machine.
+REBINDING = f"--host-resolver-rules=MAP {REBOUND} 127.0.0.1"
 ATTACKS = """async ([target, capture, design]) => {
     const send = (path, more) => fetch(target + path, {method: "POST", mode: "no-cors", ...more})
         .catch(() => null);
@@ -72,14 +69,8 @@ class Quiet(SimpleHTTPRequestHandler):
 
 @pytest.fixture
 def page() -> Iterator[Page]:
-    if not CHROMIUM.exists():
-        pytest.skip("Debian's chromium is not installed")
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=str(CHROMIUM), args=FLAGS)
-        yield chromium.new_page()
-        chromium.close()
+    with chromium(REBINDING) as browser:
+        yield browser.new_page()
 
 
 @pytest.fixture

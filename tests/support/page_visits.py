@@ -9,22 +9,19 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import pytest
-
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
 
-CHROMIUM = Path("/usr/bin/chromium")
-FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"]
 ROOT = Path(__file__).resolve().parents[2]
 
 
 @contextmanager
-def served(data: Path, *stations: Path) -> Iterator[str]:
+def served(data: Path, *stations: Path, more: tuple[str, ...] = ()) -> Iterator[str]:
     """The address of a service with these stations."""
     command = [sys.executable, "-m", "service.cli", "serve", "--port", "0", "--data", str(data)]
     for station in stations:
         command += ["--station", str(station)]
+    command += more
     with (data.parent / "service.log").open("w") as log:
         begun = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, text=True, cwd=ROOT)
         with begun as process:
@@ -33,18 +30,6 @@ def served(data: Path, *stations: Path) -> Iterator[str]:
                 yield process.stdout.readline().split()[3].removesuffix("/v1;") + "/"
             finally:
                 process.terminate()
-
-
-@contextmanager
-def chromium() -> Iterator[Browser]:
-    if not CHROMIUM.exists():
-        pytest.skip("Debian's chromium is not installed")
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=FLAGS)
-        yield browser
-        browser.close()
 
 
 class Visit:

@@ -1,7 +1,14 @@
 // All talk with the service: what the page can do, any program can do the same way.
 
 const MARK = { "X-Rigwright": "1" };
+// What a proxy puts before all paths, such as "/rigwright"; links that the service gives have it.
+const PREFIX = new URL(".", document.baseURI).pathname.replace(/\/$/, "");
 const ENDS = ["completed", "failed", "cancelled", "interrupted"];
+
+/** The address of a path of the service, whether it has the prefix already or not. */
+export function at(path) {
+  return PREFIX && !path.startsWith(`${PREFIX}/`) ? `${PREFIX}${path}` : path;
+}
 
 /** What the service answered when it could not do what was asked. */
 export class Refusal extends Error {
@@ -22,7 +29,7 @@ async function answered(response) {
 async function ask(path, given) {
   let response;
   try {
-    response = await fetch(path, given);
+    response = await fetch(at(path), given);
   } catch (error) {
     if (error.name === "AbortError") throw error;
     throw new Refusal({ detail: "the service does not answer; see that it runs", status: 0 });
@@ -52,7 +59,7 @@ export function remove(path) {
 export function upload(path, file, tell) {
   return new Promise((resolve, reject) => {
     const sending = new XMLHttpRequest();
-    sending.open("POST", path);
+    sending.open("POST", at(path));
     sending.setRequestHeader("Content-Type", "application/octet-stream");
     sending.setRequestHeader("X-Rigwright", "1");
     sending.upload.onprogress = (event) => event.lengthComputable && tell(event.loaded / event.total);
@@ -103,7 +110,7 @@ export async function follow(job, seen, signal) {
 /** Listen to a job's events; ends with the job, or when the line breaks. */
 function heard(job, seen, signal) {
   return new Promise((resolve) => {
-    const source = new EventSource(job.links.events);
+    const source = new EventSource(at(job.links.events));
     const done = () => { source.close(); resolve(); };
     source.addEventListener("progress", (event) => {
       job = { ...job, status: "running", progress: JSON.parse(event.data) };

@@ -1,6 +1,6 @@
 // Taking a capture: names, countdown, fire, abort, and the pictures as soon as they are there.
 
-import { follow, get, pause, post } from "./api.js";
+import { at, follow, get, pause, post } from "./api.js";
 import { field, fill, h, problem } from "./dom.js";
 import { watch } from "./job.js";
 import { sheet } from "./pictures.js";
@@ -31,7 +31,7 @@ export function capturing(rig, signal) {
     try {
       if (!await counted(Number(countdown.value), fire, counting.signal, signal)) return;
       fire.disabled = true;
-      own = `/v1/captures/${id}`;
+      own = at(`/v1/captures/${id}`);
       const job = await post(rig.links.captures, asked);
       await watch(place, job, (done) => outcome(done), signal);
       if (!signal.aborted) await kept(place, own, signal);
@@ -55,7 +55,7 @@ export function capturing(rig, signal) {
     if (!counting) fire.disabled = busy || now.status === "closed";
     const other = busy && now.doing && now.doing !== own;
     others.textContent = other ? "The rig is at work for somebody else." : "";
-    if (other && now.doing.startsWith("/v1/captures/")) {
+    if (other && now.doing.startsWith(at("/v1/captures/"))) {
       own = now.doing; // shown here as well: everybody at the rig sees the last capture
       shown(place, now.doing, signal);
     }

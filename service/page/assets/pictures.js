@@ -1,5 +1,6 @@
 // A capture's pictures as a contact sheet, with what is to be said of them.
 
+import { at } from "./api.js";
 import { h, table } from "./dom.js";
 
 const SHOWN = ["image/jpeg", "image/png", "image/webp", "image/gif", "image/avif"];
@@ -7,7 +8,7 @@ const VERDICTS = { synchronised: "good", "not-synchronised": "bad", undecided: "
 
 /** Where a file of a session is. */
 export function address(session, path) {
-  return `/v1/sessions/${encodeURIComponent(session)}/files/${path.split("/").map(encodeURIComponent).join("/")}`;
+  return at(`/v1/sessions/${encodeURIComponent(session)}/files/${path.split("/").map(encodeURIComponent).join("/")}`);
 }
 
 /** All of a capture: verdict, faults, pictures by shot, and those that are missing. */

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from browsers import chromium
 from plans import plate_plan, tslot_plan
 
 from rig.build.drawings.views import plan_solids
@@ -24,8 +25,6 @@ from rig.catalogue import load_catalogue
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
 
-CHROMIUM = Path("/usr/bin/chromium")
-FLAGS = ["--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking"]
 EVIL = "</script><img src=x onerror=alert(1)> & \"quoted\" 'name'"
 CATALOGUE = load_catalogue()
 
@@ -115,14 +114,8 @@ def test_a_plan_that_cannot_be_built_says_so() -> None:
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
-    if not CHROMIUM.exists():
-        pytest.skip("Debian's chromium is not installed")
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=str(CHROMIUM), args=FLAGS)
-        yield chromium
-        chromium.close()
+    with chromium() as opened:
+        yield opened
 
 
 @pytest.mark.needs_browser

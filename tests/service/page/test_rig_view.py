@@ -5,9 +5,11 @@ from __future__ import annotations
 import json
 import urllib.request
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
-from page_visits import Visit, chromium, served
+from browsers import chromium
+from page_visits import Visit, served
 from stations import write_station
 
 pytestmark = pytest.mark.needs_browser
@@ -79,3 +81,14 @@ def test_views_of_an_empty_service(visits: tuple[Visit, Visit], view: str) -> No
     one.page.locator("main h1").wait_for()
     one.page.wait_for_load_state("networkidle")
     one.sound()
+
+
+def test_the_page_works_behind_a_proxy(tmp_path: Path) -> None:
+    station = write_station(tmp_path / "rig")
+    behind = served(tmp_path / "data", station, more=("--root-path", "/lab"))
+    with behind as address, chromium() as browser:
+        one = Visit(browser, f"{address}lab/")
+        one.see("Trigger box: ready")
+        one.press("Fire")
+        one.page.locator(".sheet img").nth(1).wait_for()
+        one.sound()

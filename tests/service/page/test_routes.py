@@ -8,12 +8,13 @@ import pytest
 from fastapi.testclient import TestClient
 
 from service.api.app import make_app
+from service.api.conditional import Conditional
 from service.page.routes import POLICY, assets
 
 
 @pytest.fixture(scope="module")
 def client() -> TestClient:
-    return TestClient(make_app(), raise_server_exceptions=False)
+    return TestClient(Conditional(make_app()), raise_server_exceptions=False)
 
 
 def test_a_browser_gets_a_page(client: TestClient) -> None:
@@ -26,7 +27,8 @@ def test_a_browser_gets_a_page(client: TestClient) -> None:
 
 def test_what_the_page_asks_for_is_there(client: TestClient) -> None:
     html = client.get("/").text
-    wanted = re.findall(r'(?:src|href)="(/page/[^"]+)"', html)
+    wanted = re.findall(r'(?:src|href)="(page/[^"]+)"', html)
+    wanted = [f"/{path}" for path in wanted]
     scripts = [name for name in assets() if name.endswith(".js")]
     for name in scripts:
         found = re.findall(r'from "\./([^"]+)"', assets()[name].content.decode())
