@@ -56,11 +56,9 @@ def stand(
     found, scale, notes = _found(samples, declared, options)
     rotation, axes_notes = _rotation(found, kind, options)
     turned = samples.points_mm @ rotation.T
-    if found is None and scale is None:
+    if scale is None:
         scale, note = mm_per_unit(turned, declared)
         notes += (note,)
-    elif scale is None:
-        scale = 1.0
     if options.scale is not None or options.units != "auto":
         notes += size_warning(scale * np.ptp(turned, axis=0))
     face = None

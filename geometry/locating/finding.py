@@ -19,8 +19,12 @@ SURE = 0.5
 """A face found with less confidence than this is refused."""
 
 _STIFF = Stiffness(place_mm=4.0, modes=0)
+"""While the pose is looked for the average face stays as it is: faces differ from it by 4 mm."""
 _SOFT = Stiffness(place_mm=0.6, modes=32)
 _LOOSE = replace(_SOFT, anchor=0.01)
+
+# How many ways go on from step to step: enough that the right one is among them on the heads of
+# tests/geometry/test_face_finding.py, few enough for a few seconds.
 _TURNS_ABOUT = 12
 _TILT_DEG = 20.0
 _TURNS_TRIED = 4
@@ -33,11 +37,15 @@ _ROUGH_MM = 75.0
 _ROUGH_EVERY = 8
 _VOXEL_MM = 4.0
 _MOST_COST_MM = 1.5
+"""Between the worst of faces that were tried (0.71) and a head without its face (2.43)."""
 _COST_SPREAD_MM = 0.08
 _LEAST_LEAD_MM = 0.3
+"""The nearest other pose of a face that was there cost 1.1 mm more (1.84 to 0.71)."""
 _LEAD_SPREAD_MM = 0.1
 _OTHER_HEAD_MM = 60.0
+"""Noses nearer than this are of one head."""
 _TWIN_MM = 0.7
+"""The second face of a scan may be seen less well than the first by so much."""
 _HINT_DEG = 45.0
 _SWAY_DEG = 9.0
 
