@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, replace
-from enum import StrEnum
 
 import numpy as np
 
@@ -21,10 +20,11 @@ from solver.outer_loop import StartResult
 from solver.pool import StartJob, run_all
 from solver.problem import Problem, camera_at
 from solver.quality import evaluate
-from solver.refinement import refine
+from solver.refinement import optimality_error, refine
 from solver.result import Design, Quality, Relaxation, SolverReport, StartReport, Status
 from solver.search.exchange import search_networks
 from solver.starts import kmeans_start, strips
+from solver.strategy import Strategy
 
 ENGINE = "sequential quadratic programming with exact second derivatives (PIQP)"
 _EXPECTED_OUTER_ITERATIONS = 8
@@ -33,18 +33,6 @@ _FINE = 2
 
 _REFINEMENT_COST = 1.01
 _REFINEMENT_TRIES = 3
-
-
-class Strategy(StrEnum):
-    """Where starts come from.
-
-    ``EXCHANGE``: networks searched among candidate poses, each then moved a little; where none
-    of them meets the limits, or limits are on that the search does not know, also ``K_MEANS``:
-    the source paper's clusters, the best strip, and clusters jittered.
-    """
-
-    EXCHANGE = "exchange"
-    K_MEANS = "k-means"
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,11 +122,12 @@ def design(
     """Place ``count`` cameras so that the subject is measured as exactly as the limits allow.
 
     ``fixed`` cameras of an existing rig stay where they are and take part. ``start`` gives the
-    poses of the first start, about which Eq 8 bounds the cameras. The best feasible of
-    ``starts`` wins, worked on by ``workers`` processes; the result does not depend on their
-    number. When the limits contradict each other the nearest network is returned with status
-    ``infeasible`` and the conflicts named. Raises :class:`InputError` for orders that cannot be
-    understood and :class:`CancelledError` within a second of ``cancel`` being set.
+    poses of the first start, about which Eq 8 bounds the cameras. ``strategy`` says where starts
+    come from otherwise. The best feasible of ``starts`` wins, worked on by ``workers`` processes;
+    the result does not depend on their number. When the limits contradict each other the nearest
+    network is returned with status ``infeasible`` and the conflicts named. Raises
+    :class:`InputError` for orders that cannot be understood and :class:`CancelledError` within a
+    second of ``cancel`` being set.
     """
     request = Request(subject, camera, limits, count, seed, starts, fixed, start, strategy)
     token = cancel or NeverCancelled()
@@ -160,7 +149,7 @@ def design(
     values, quality, kkt, why, iterations = _finish(problem, results[best], scores[best], token)
     begin = evaluate(subject, problem.cameras, limits, problem.anchor)
     if _rank(begin) < _rank(quality):
-        values, quality, kkt = problem.start_values(), begin, np.nan
+        values, quality, kkt = problem.start_values(), begin, np.nan  # nobody solved there
         why = "no solve found anything better than the start"
     found: tuple[Relaxation, ...] = ()
     if not quality.feasible:
@@ -338,7 +327,7 @@ def _finish(
             added_points=np.union1d(result.added_points, judged.missed),
             margins=result.margins.wider(judged.shortfall),
         )
-    return result.values, quality, result.outcome.kkt_error, result.why, 0
+    return result.values, quality, optimality_error(problem, result), result.why, 0
 
 
 def _status(quality: Quality, kkt: float) -> Status:

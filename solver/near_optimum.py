@@ -19,11 +19,13 @@ from solver.constraints.builders.coverage import cut_constraints
 from solver.coverage.assignment import Margins
 from solver.coverage.cuts import VisibilityCuts, cuts_for_hidden, opening_directions
 from solver.coverage.views import (
+    FEW_VIEWS,
     NEAR,
     NOWHERE,
     Judged,
     Views,
     centres_mm,
+    holding_scarce,
     in_frame,
     judge,
     views,
@@ -51,7 +53,6 @@ FIRST_BOX = 0.06
 
 LARGEST_BOX = 0.2
 SMALLEST_BOX = 0.004
-_FEW_VIEWS = 2
 _MOST_WEAK = 200
 MAX_MOVES = 24
 _STEPS = 25
@@ -123,7 +124,7 @@ def _checked(problem: Problem, values: Floats) -> tuple[float, Ints]:
     weight = seen * problem.ray_weight[:, None]
     cost = CovarianceCost(problem.scaled(source.points_mm), weight, problem.prior).value(state)
     count = seen.sum(axis=0)
-    weak = np.flatnonzero((count > 0) & (count <= _FEW_VIEWS))
+    weak = np.flatnonzero((count > 0) & (count <= FEW_VIEWS))
     return cost, weak[:: max(1, len(weak) // _MOST_WEAK)]
 
 
@@ -146,7 +147,7 @@ def _moved(
     """Solve within a box about the best network; also the cuts of rays that go lost there."""
     problem = with_points(problem, np.union1d(held.added_points, best.weak))
     state = problem.unknowns.state(best.values)
-    seen = views(problem, state, None, _MARGINS, NEAR)
+    seen = holding_scarce(problem, views(problem, state, None, _MARGINS, NEAR))
     seen = replace(seen, framed=seen.framed | held.framed)
     rows = candidate_constraints(problem, state, seen)
     rows += cut_constraints(problem, held.cuts.of(seen.assigned))

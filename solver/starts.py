@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from scipy.cluster.vq import kmeans2
 from scipy.spatial.transform import Rotation
@@ -47,20 +49,20 @@ def fitting_distance(
     rotation = look_at_rotation(np.zeros(3), forward, roll_deg)
     middle = points_mm.mean(axis=0) if target_mm is None else target_mm
     local = (points_mm - middle) @ rotation.T
-    left, right, top, bottom = camera.frame_limits(
-        0.0 if limits.frame is None else limits.frame.margin_px
-    )
+    margin = 0.0 if limits.frame is None else limits.frame.margin_px
+    left, right, top, bottom = _frame_limits(camera, margin)
     # x / (z + D) <= right, and so on, solved for D.
     needed = [local[:, 0] / right, local[:, 0] / left, local[:, 1] / bottom, local[:, 1] / top]
     frame = float((np.stack(needed) - local[:, 2]).max())
     radius = float(np.abs(local).max())
     low = max(frame, radius * 1.05, limits.stand_off.min_mm or 0.0)
     high = max(low, limits.stand_off.max_mm or _FARTHEST_RADII * radius)
-    if limits.depth_of_field and not _sharp_at(camera, low, local[:, 2]):
+    nearest, farthest = float(local[:, 2].min()), float(local[:, 2].max())
+    if limits.depth_of_field and not _sharp(camera, low + nearest, low + farthest):
         far = high
         for _ in range(60):
             middle_distance = 0.5 * (low + far)
-            if _sharp_at(camera, middle_distance, local[:, 2]):
+            if _sharp(camera, middle_distance + nearest, middle_distance + farthest):
                 far = middle_distance
             else:
                 low = middle_distance
@@ -68,9 +70,14 @@ def fitting_distance(
     return min(low, high)
 
 
-def _sharp_at(camera: Camera, distance: float, z: Floats) -> bool:
-    """Whether some focus distance makes depths ``distance + z`` sharp."""
-    near, far = distance + z.min(), distance + z.max()
+@lru_cache(maxsize=16)
+def _frame_limits(camera: Camera, margin_px: float) -> Floats:
+    """Kept: a search asks a thousand times for those of one camera."""
+    return camera.frame_limits(margin_px)
+
+
+def _sharp(camera: Camera, near: float, far: float) -> bool:
+    """Whether some focus distance makes depths from ``near`` to ``far`` sharp."""
     # Both limits bind at the harmonic mean: s/(1+k) = near and s/(1-k) = far.
     focus = camera.focus_distance_mm or max(
         2.0 * near * far / (near + far), camera.min_focus_distance_mm

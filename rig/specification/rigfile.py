@@ -20,6 +20,7 @@ from rig.specification.sections.parts import CATALOGUE
 from rig.specification.sections.poses import FixedSection, StartSection
 from rig.specification.sections.subject import ScanSection, SubjectSection
 from rig.specification.spec import RigSpec
+from solver.strategy import Strategy
 
 SCHEMA: Literal["rigwright.rig/1"] = "rigwright.rig/1"
 """A rig file is a page or two; a larger one is another file given by mistake."""
@@ -43,6 +44,14 @@ class RigFile(StrictModel):
     )
     seed: int = Field(default=0, ge=0, le=2**53 - 1, description="Seed of everything random.")
     starts: int = Field(default=8, ge=1, le=1000, description="How many starts to try.")
+    strategy: Strategy = Field(
+        default=Strategy.K_MEANS,
+        strict=False,
+        description='Where starts come from: `"exchange"` searches networks among candidate poses '
+        'and moves the best two; `"k-means"` clusters the points, as the source paper does, and '
+        "tries the best strip and clusters jittered. Where `[[start]]` poses are given it has no "
+        "say.",
+    )
     camera: CameraSection = Field(description="The kind of camera.")
     limits: LimitsSection = Field(
         default_factory=LimitsSection, description="What the rig must respect."
@@ -63,6 +72,7 @@ class RigFile(StrictModel):
             count=(len(self.start) or 7) if self.cameras is None else self.cameras,
             seed=self.seed,
             starts=self.starts,
+            strategy=self.strategy,
             limits=self.limits.to_limits(),
             fixed=tuple(section.to_rig_camera(camera) for section in self.fixed),
             start=tuple(section.to_pose() for section in self.start),
@@ -79,6 +89,7 @@ class RigFile(StrictModel):
             cameras=spec.count,
             seed=spec.seed,
             starts=spec.starts,
+            strategy=spec.strategy,
             camera=CameraSection.from_camera(spec.camera),
             limits=LimitsSection.from_limits(spec.limits),
             fixed=[FixedSection.from_rig_camera(camera) for camera in spec.fixed],

@@ -11,6 +11,7 @@ from geometry.preparation import SubjectOptions
 from geometry.scanoptions import ScanOptions
 from rig.specification.contradictions import check_limits
 from solver.limits import Limits
+from solver.strategy import Strategy
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,8 +20,8 @@ class RigSpec:
 
     ``count`` cameras of the kind ``camera`` are placed; ``fixed`` ones stand already and come
     on top. ``start`` holds one start pose per camera to place, or none. ``starts`` is the
-    number of starts to try. With a ``count`` of 0 the rig is the fixed cameras. Raises
-    :class:`InputError` when the parts contradict each other.
+    number of starts to try, ``strategy`` where they come from. With a ``count`` of 0 the rig is the
+    fixed cameras. Raises :class:`InputError` when the parts contradict each other.
     """
 
     name: str
@@ -28,6 +29,7 @@ class RigSpec:
     count: int
     seed: int
     starts: int
+    strategy: Strategy
     limits: Limits
     fixed: tuple[RigCamera, ...]
     start: tuple[Pose, ...]

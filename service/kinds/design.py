@@ -9,13 +9,14 @@ from pydantic import Field
 
 from rig.specification.rigfile import RigFile
 from rig.specification.spec import RigSpec
+from rig.specification.strategies import Strategy
 from service.kinds.base import LARGEST_JSON_INTEGER, Figure, JobKind, Model, Request, Result
 from service.kinds.evaluation import EvaluationResult
 from service.kinds.scanned import rig_for_scan
 
 
 class DesignRequest(Request):
-    """What to design. ``cameras``, ``seed`` and ``starts`` override those of the rig."""
+    """What to design. What is given beside the rig overrides what the rig says."""
 
     rig: Annotated[RigFile, Field(description="The structure of a rig file, as JSON.")]
     cameras: Annotated[
@@ -24,6 +25,10 @@ class DesignRequest(Request):
     ] = None
     seed: Annotated[int | None, Field(ge=0, le=LARGEST_JSON_INTEGER)] = None
     starts: Annotated[int | None, Field(ge=1, le=1000, description="Starts to try.")] = None
+    strategy: Annotated[
+        Annotated[Strategy, Field(strict=False)] | None,
+        Field(description="Where starts come from, as in a rig file."),
+    ] = None
 
     def for_scan(self, options: Mapping[str, str | float]) -> Self:
         """The same, the scan read with its own ``options`` where the rig has none."""
@@ -31,7 +36,12 @@ class DesignRequest(Request):
 
     def spec(self) -> RigSpec:
         """The rig with what is asked for instead. Raises :class:`InputError`."""
-        given = {"cameras": self.cameras, "seed": self.seed, "starts": self.starts}
+        given = {
+            "cameras": self.cameras,
+            "seed": self.seed,
+            "starts": self.starts,
+            "strategy": self.strategy,
+        }
         changed = {name: value for name, value in given.items() if value is not None}
         return self.rig.model_copy(update=changed).to_spec()
 

@@ -98,6 +98,7 @@ def _solved(prepared: PreparedSubject, spec: RigSpec, workers: int, running: Run
         starts=spec.starts,
         fixed=spec.fixed,
         start=spec.start or None,
+        strategy=spec.strategy,
         workers=workers,
         progress=between(running.report, _READING, _DESIGNING),
         cancel=running.cancel,

@@ -15,6 +15,8 @@ from solver.problem import Problem
 from solver.variables import NetworkState
 
 FIRST_MARGINS = Margins()
+FEW_VIEWS = 2
+"""A point with so many views or fewer hangs on each of them."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +61,26 @@ class Views:
             self.assigned.camera, chosen[self.assigned.point], self.assigned.kept
         )
         return Views(seen, self.framed, assigned, self.margin_deg)
+
+
+def holding_scarce(problem: Problem, seen: Views) -> Views:
+    """The views with those of points that have one or two promised as well.
+
+    Where so few cameras see a point, losing one of them costs more than a good network gains by
+    moving; tiers leave such points out, because they are the hardest.
+    """
+    free = np.array([not c.fixed for c in problem.cameras])
+    scarce = seen.seen & (seen.seen.sum(axis=0) <= FEW_VIEWS) & free[:, None]
+    scarce[seen.assigned.camera, seen.assigned.point] = False
+    camera, point = np.nonzero(scarce)
+    return replace(
+        seen,
+        assigned=AssignedViews(
+            np.concatenate([seen.assigned.camera, camera]),
+            np.concatenate([seen.assigned.point, point]),
+            np.concatenate([seen.assigned.kept, np.ones(len(camera), dtype=np.bool_)]),
+        ),
+    )
 
 
 def centres_mm(problem: Problem, state: NetworkState) -> Floats:

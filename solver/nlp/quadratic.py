@@ -6,13 +6,18 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy import sparse
+from scipy.optimize import lsq_linear
 
 from geometry.arrays import Floats
 from solver.nlp.iterate import Iterate
+from solver.nlp.program import NonlinearProgram
 from solver.nlp.working_program import WorkingProgram
 
 QP_ACCURACY = 1e-11
 """Of the quadratic programs; steps to a KKT error of 1e-8 need about three digits more."""
+
+_AT_LIMIT = 1e-6
+"""Rows this near their limit, in the solver's units of order one, are taken to bind."""
 
 _FLAT = 0.01
 """Least curvature of a model, in start costs per squared length scale: the roll about the
@@ -75,6 +80,31 @@ class Linearised:
         return np.asarray(
             self.working.values(self.working.pack(trial)) - self.jacobian @ np.r_[move, slack]
         )
+
+
+def stationarity(program: NonlinearProgram, values: Floats) -> float:
+    """The KKT error at unknowns (7 n,) with the multipliers of binding rows that suit best.
+
+    They are found by least squares, never of the wrong sign: those of a solve may be unknown
+    because it ended elsewhere, or because its bounds were others.
+    """
+    working = Iterate.first(program, values, None, 1.0, _AT_LIMIT).working_set().program
+    local = Linearised.at(working, values)
+    low, high = working.row_bounds
+    at_low, at_high = local.values - low < _AT_LIMIT, high - local.values < _AT_LIMIT
+    rows = np.flatnonzero(at_low | at_high)
+    free = len(working.free)
+    here, (x_low, x_high) = local.variables[:free], (b[:free] for b in working.bounds)
+    at_x_low, at_x_high = here <= x_low + 1e-9, here >= x_high - 1e-9
+    held = np.flatnonzero(at_x_low | at_x_high)
+    columns = np.hstack([local.jacobian[rows][:, :free].toarray().T, np.eye(free)[:, held]])
+    most = np.r_[np.where(at_high[rows], np.inf, 0.0), np.where(at_x_high[held], np.inf, 0.0)]
+    least = np.r_[np.where(at_low[rows], -np.inf, 0.0), np.where(at_x_low[held], -np.inf, 0.0)]
+    weights = np.zeros(working.rows)
+    if columns.shape[1]:
+        found = lsq_linear(columns, -local.gradient[:free], (least, most), tol=1e-12).x
+        weights[rows] = found[: len(rows)]
+    return local.kkt_error(weights)
 
 
 def convex(hessian: Floats, active: Floats) -> Floats:

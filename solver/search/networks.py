@@ -11,6 +11,9 @@ from geometry.arrays import Bools, Floats, Ints
 from solver.limits import Limits
 from solver.search.candidates import Candidates
 
+_AT_A_TIME = 24
+"""Candidates weighed at a time: what a few hundred points of them take stays in the cache."""
+
 _COVERAGE_WEIGHT = 30.0
 """A share of points that lack views costs this much times that share, in units of the cost."""
 
@@ -69,17 +72,24 @@ class Search:
 
     def score(self, network: Ints) -> tuple[int, float]:
         """Rules broken and cost of one network."""
-        rest, last = network[:-1], network[-1]
-        broken, cost = self.scores_with_each(rest)
-        return int(broken[last]), float(cost[last])
+        pool = self.candidates
+        entries = pool.information[network].sum(axis=0)
+        entries[:3] += pool.prior
+        cost = covariance_norms(entries).mean()
+        factor = self._shortfall_factor(pool.seen[network].sum(axis=0))
+        return int(self._broken_with_each(network[:-1])[network[-1]]), float(cost * factor)
 
     def scores_with_each(self, rest: Ints) -> tuple[Ints, Floats]:
         """Rules broken (m,) and cost (m,) of the network ``rest`` with each candidate added."""
         pool = self.candidates
         base = pool.information[rest].sum(axis=0)
         base[:3] += pool.prior
-        cost = covariance_norms(base[None] + pool.information).mean(axis=1)
-        return self._broken_with_each(rest), cost * self._shortfall_factor(rest)
+        cost = np.empty(len(pool))
+        for first in range(0, len(pool), _AT_A_TIME):
+            some = slice(first, first + _AT_A_TIME)
+            cost[some] = covariance_norms(base[None] + pool.information[some]).mean(axis=1)
+        count = pool.seen[rest].sum(axis=0)[None] + pool.seen
+        return self._broken_with_each(rest), cost * self._shortfall_factor(count)
 
     def _broken_with_each(self, rest: Ints) -> Ints:
         among = self.too_close[np.ix_(rest, rest)]
@@ -91,13 +101,11 @@ class Search:
             broken = broken + ~self.near[:, rest].any(axis=1)
         return np.asarray(broken)
 
-    def _shortfall_factor(self, rest: Ints) -> Floats:
-        """By how much (m,) the cost is raised for views that are lacking."""
-        pool = self.candidates
-        count = pool.seen[rest].sum(axis=0)[None] + pool.seen
-        lack = np.zeros(len(pool))
+    def _shortfall_factor(self, count: Ints) -> Floats:
+        """By how much (...) the cost is raised for views lacking among the counts (..., p)."""
+        lack = np.zeros(count.shape[:-1])
         for tier in self.limits.coverage.tiers:
-            lack = np.maximum(lack, tier.share - (count >= tier.views).mean(axis=1))
+            lack = np.maximum(lack, tier.share - (count >= tier.views).mean(axis=-1))
         return np.asarray(1.0 + _COVERAGE_WEIGHT * lack)
 
     def best_addition(self, rest: Ints) -> int:

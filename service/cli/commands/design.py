@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from rig.specification.strategies import Strategy
 from service.cli.options import ForceOption, JsonOption, RigOption, ScanArgument, WorkersOption
 
 if TYPE_CHECKING:
@@ -41,6 +42,12 @@ def design(
             min=1, max=1000, help="Starts to try, instead of the rig's number.", show_default=False
         ),
     ] = None,
+    strategy: Annotated[
+        Strategy | None,
+        typer.Option(
+            help="Where starts come from, instead of the rig's choice.", show_default=False
+        ),
+    ] = None,
     workers: WorkersOption = None,
     as_json: JsonOption = False,
     force: ForceOption = False,
@@ -60,7 +67,9 @@ def design(
 
     def request() -> DesignRequest:
         require_files([scan, rig])
-        return DesignRequest(rig=read_rig_file(rig), cameras=cameras, seed=seed, starts=starts)
+        return DesignRequest(
+            rig=read_rig_file(rig), cameras=cameras, seed=seed, starts=starts, strategy=strategy
+        )
 
     run = RunContext(workers=processes(workers), scan_name=scan.name)
     run_design(

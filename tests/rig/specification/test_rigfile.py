@@ -17,6 +17,7 @@ from geometry.preparation import prepare_subject
 from geometry.reading import read_scan
 from rig.specification.examples import example_names, example_rig, example_text
 from rig.specification.rigfile import RigFile, parse_rig, read_rig, rig_from_mapping
+from rig.specification.strategies import Strategy
 from solver.limits import Box, HalfSpace, Limits, Sphere
 
 
@@ -42,6 +43,13 @@ def test_the_face_example_is_the_papers_camera() -> None:
     assert spec.camera.field_of_view_deg[0] == pytest.approx(26.0, abs=0.05)
     assert spec.camera.body.size_mm.tolist() == [62.0, 45.0, 32.0]
     assert spec.limits.spacing is None, "the table is there, switched off"
+
+
+def test_where_starts_come_from_is_a_choice_that_is_kept() -> None:
+    assert rig_from_mapping(face()).strategy is Strategy.K_MEANS
+    spec = rig_from_mapping(put(face(), "strategy", "exchange"))
+    assert spec.strategy is Strategy.EXCHANGE
+    assert RigFile.from_spec(spec).to_spec().strategy is Strategy.EXCHANGE
 
 
 def test_examples_in_the_folder_are_those_of_the_package(repo: Path) -> None:
@@ -220,6 +228,7 @@ LINES = {
     ),
     "start": ([{"position_mm": [0, 0, 0]}], "start[0]; give exactly one of omega_phi_kappa_deg"),
     "subject.region": ("nose", "subject.region is 'nose'"),
+    "strategy": ("luck", "strategy is 'luck'; it should be 'exchange' or 'k-means'"),
 }
 
 

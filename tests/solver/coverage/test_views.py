@@ -11,7 +11,16 @@ import rigs
 from geometry.frames import Pose
 from geometry.surface import SurfacePoints
 from solver.coverage.assignment import AssignedViews, Margins
-from solver.coverage.views import Views, centres_mm, in_frame, judge, views, with_points
+from solver.coverage.views import (
+    NOWHERE,
+    Views,
+    centres_mm,
+    holding_scarce,
+    in_frame,
+    judge,
+    views,
+    with_points,
+)
 from solver.limits import Coverage, CoverageTier, Incidence, MotionBox
 from solver.problem import Problem, camera_at
 
@@ -256,3 +265,21 @@ def test_missed_points_join_once_and_behind_the_object() -> None:
 def test_no_missed_points_change_nothing() -> None:
     problem = problem_of()
     assert with_points(problem, np.zeros(0, dtype=np.int64)) is problem
+
+
+def test_points_with_few_views_are_promised_those_that_they_have() -> None:
+    problem = problem_of(3, CoverageTier(3, 0.5))
+    cameras = (replace(problem.cameras[0], fixed=True), *problem.cameras[1:])
+    problem = replace(problem, cameras=cameras)
+    seen = views(problem, state_of(problem), None, Margins(0.0, 0.0), NOWHERE)
+    found = holding_scarce(problem, seen)
+    count = seen.seen.sum(axis=0)
+    pairs = list(zip(found.assigned.camera.tolist(), found.assigned.point.tolist(), strict=True))
+    assert len(set(pairs)) == len(pairs)
+    before = set(zip(seen.assigned.camera.tolist(), seen.assigned.point.tolist(), strict=True))
+    scarce = {(int(c), int(p)) for c, p in np.argwhere(seen.seen) if count[p] <= 2 and c > 0}
+    assert scarce - before
+    assert set(pairs) == before | scarce
+    # Of the fixed camera nothing is promised, and what is seen is kept.
+    kept = dict(zip(pairs, found.assigned.kept.tolist(), strict=True))
+    assert all(kept[pair] for pair in scarce)

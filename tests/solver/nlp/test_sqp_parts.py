@@ -14,7 +14,7 @@ from solver.constraints.positions import PositionCoordinate, PositionDistance
 from solver.nlp.iterate import Iterate, Point
 from solver.nlp.penalty import LARGEST_PENALTY, LEAST_PENALTY, Penalty
 from solver.nlp.program import NonlinearProgram
-from solver.nlp.quadratic import Linearised, convex, quadratic_step
+from solver.nlp.quadratic import Linearised, convex, quadratic_step, stationarity
 from solver.nlp.sqp import minimise
 from solver.nlp.working_program import WorkingProgram
 from solver.variables import NetworkState, Unknowns
@@ -338,6 +338,26 @@ def test_the_kkt_error_forgives_what_a_bound_holds() -> None:
         first(replace(nlp, bounds=program().bounds), start()).working_set().program, start()
     )
     assert free.kkt_error(np.zeros(0)) == 1.0
+
+
+def test_stationarity_finds_the_multipliers_that_a_solve_would() -> None:
+    row = program(at_least("a", 0, 1.0))
+    assert stationarity(row, start(1.0)) == pytest.approx(0.0, abs=1e-9)
+    # Where the row binds, the cost's slope along it is left: 0.3 in y.
+    assert stationarity(row, start(1.0, 0.3)) == pytest.approx(0.3)
+    # A row pushes one way only, and one that does not bind not at all.
+    assert stationarity(program(at_most("a", 0, 1.0)), start(1.0)) == pytest.approx(1.0)
+    assert stationarity(row, start(1.1)) == pytest.approx(1.1)
+    assert stationarity(program(), start(0.5)) == pytest.approx(0.5)
+
+
+def test_stationarity_forgives_what_bounds_hold_and_equalities_push_both_ways() -> None:
+    bounded = replace(program(), bounds=(np.full(7, 0.4), np.full(7, 9.0)))
+    assert stationarity(bounded, start(0.4, 0.4, 0.4)) == pytest.approx(0.0, abs=1e-9)
+    assert stationarity(bounded, start(0.4, 0.4, 0.5)) == pytest.approx(0.5)
+    for side in (-1.0, 1.0):
+        equal = program(coordinates("a", [0], [side], [side]))
+        assert stationarity(equal, start(side)) == pytest.approx(0.0, abs=1e-9)
 
 
 # --- the method -------------------------------------------------------------------------------

@@ -1,0 +1,29 @@
+"""What a request for a design asks for beside its rig."""
+
+from __future__ import annotations
+
+import tomllib
+
+import pytest
+from pydantic import ValidationError
+
+from rig.specification.examples import example_text
+from rig.specification.strategies import Strategy
+from service.kinds.design import DesignRequest
+
+RIG = tomllib.loads(example_text("face"))
+
+
+def test_what_is_asked_for_comes_before_what_the_rig_says() -> None:
+    plain = DesignRequest.model_validate({"rig": RIG}).spec()
+    assert (plain.count, plain.seed, plain.starts, plain.strategy) == (7, 1, 8, Strategy.K_MEANS)
+    asked = {"cameras": 5, "seed": 4, "starts": 2, "strategy": "exchange"}
+    other = DesignRequest.model_validate({"rig": RIG} | asked).spec()
+    assert (other.count, other.seed, other.starts, other.strategy) == (5, 4, 2, Strategy.EXCHANGE)
+    kept = DesignRequest.model_validate({"rig": RIG | {"strategy": "exchange"}}).spec()
+    assert kept.strategy is Strategy.EXCHANGE
+
+
+def test_a_strategy_that_nobody_knows_is_refused() -> None:
+    with pytest.raises(ValidationError, match="exchange"):
+        DesignRequest.model_validate({"rig": RIG, "strategy": "luck"})
