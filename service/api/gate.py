@@ -105,8 +105,11 @@ class Gate:
 
 
 def _wrong_type(method: str, path: str, headers: Headers) -> InputError | None:
+    if method != "POST":
+        # A browser asks before it sends these for a page, and nothing here reads their body.
+        return None
     given = headers.get("content-type", "").split(";")[0].strip().lower()
-    upload = method == "POST" and path in UPLOADS
+    upload = path in UPLOADS
     if upload and (given in _SENT_WITHOUT_ASKING or given.endswith("json")):
         return InputError(
             "media-type",
@@ -118,8 +121,7 @@ def _wrong_type(method: str, path: str, headers: Headers) -> InputError | None:
         return InputError(
             "media-type", f"the body is {_short(given)}", "send Content-Type: application/json"
         )
-    # A browser asks before it sends other methods than POST.
-    if method == "POST" and not given and HEADER not in headers:
+    if not given and HEADER not in headers:
         return InputError(
             "unmarked",
             "any web page could have sent this request",

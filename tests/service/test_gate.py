@@ -84,6 +84,15 @@ def test_a_wrong_type_is_told_the_right_one(
     assert right in answer.json()["remedy"]
 
 
+@pytest.mark.parametrize("method", ["PUT", "PATCH", "DELETE"])
+def test_a_method_that_does_not_exist_is_told_whatever_it_carries(
+    client: TestClient, method: str
+) -> None:
+    headers = {"Content-Type": "application/octet-stream"}
+    answer = client.request(method, "/v1/scans", content=b"solid", headers=headers)
+    assert answer.status_code == 405
+
+
 def test_every_answer_is_protected(client: TestClient) -> None:
     for path in ("/v1", "/v1/nothing"):
         headers = client.get(path).headers
