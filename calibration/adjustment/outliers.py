@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from calibration.adjustment.components import Component, image_components
 from calibration.adjustment.levenberg import Solution, misfits
@@ -135,7 +135,7 @@ def _blunders(network: Network, found: Reliability, rescale: bool) -> Bools:
             if rows[k + 1] > rows[k]:
                 # The median of chi-square with two degrees of freedom is 2 log 2.
                 t[own] /= max(1.0, float(np.median(t[own])) / (2.0 * np.log(2.0)))
-    bad = t > chi2.isf(BLUNDER_CHANCE / max(len(t), 1), 2)
+    bad = t > chdtri(2, BLUNDER_CHANCE / max(len(t), 1))
     key = network.observed.pose * network.target_count + network.observed.target
     worst = np.zeros(int(key.max(initial=0)) + 1)
     np.maximum.at(worst, key, t)

@@ -11,7 +11,7 @@ import itertools
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from calibration.adjustment.state import State
 from calibration.check.epoch import Epoch
@@ -136,7 +136,7 @@ def _pruned(
             continue
         fewer = [h for h in kept if h is not one]
         without = fit_with(epoch, state, fewer)
-        if without.chi2 - whole.chi2 < chi2.isf(one.alpha, one.ways.shape[1]):
+        if without.chi2 - whole.chi2 < chdtri(one.ways.shape[1], one.alpha):
             kept, last = fewer, without
     return kept, last
 
@@ -154,7 +154,7 @@ def _together(causes: list[Hypothesis], last: Fit) -> Floats:
 
 def _cleaned(epoch: Epoch, first: Fit) -> tuple[Epoch, Fit, int]:
     """Without single blunders: points that fail alone while their cameras and targets do not."""
-    lost, limit = 0, chi2.isf(ROW_CHANCE / max(len(epoch.pixel), 1), 2)
+    lost, limit = 0, chdtri(2, ROW_CHANCE / max(len(epoch.pixel), 1))
     while lost < MOST_OUTLIERS * len(epoch.pixel):
         t = np.sum(first.v**2 / np.maximum(1.0 - first.linear.leverage, 1e-3), axis=1)
         bad = _lonely(epoch, t, float(limit))

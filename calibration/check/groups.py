@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from calibration.adjustment.camera import INTERIOR, PER_CAMERA
 from calibration.adjustment.rotations import cross_matrix
@@ -46,4 +46,4 @@ def rigid_group(diagnosis: Diagnosis) -> tuple[Hypothesis, ...]:
     others = [h for h in diagnosis.accepted if h.cause is not Cause.POSE]
     # From the first fit's state it would not start: that is bent to what it did not know of.
     lost = fit_with(epoch, diagnosis.start, [*others, one]).chi2 - last.chi2
-    return poses if lost < chi2.isf(ALPHA, 6 * (len(poses) - 1)) else ()
+    return poses if lost < chdtri(6 * (len(poses) - 1), ALPHA) else ()

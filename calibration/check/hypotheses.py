@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
-from scipy.special import gammaln
-from scipy.stats import chi2
+from scipy.special import chdtrc, gammaln
 
 from calibration.adjustment.camera import INTERIOR, PER_CAMERA
 from calibration.check.epoch import Epoch
@@ -84,7 +83,7 @@ def log_tail(statistic: float, dof: int) -> float:
     if dof == 0:
         return 0.0
     if statistic < TAIL:
-        return float(chi2.logsf(statistic, dof))
+        return float(np.log(chdtrc(dof, statistic)))
     half = dof / 2.0
     x = statistic / 2.0
     # Upper incomplete gamma function by its leading terms: the ratio falls as (half - 1) / x.

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtrc, chdtri
 
 from calibration.check.hypotheses import Hypothesis, log_tail
 from calibration.check.linear import GONE, Linear
@@ -61,14 +61,14 @@ class ScoreTests:
 
     def _log_tails(self, statistic: Floats) -> Floats:
         dof = np.maximum(self.dof, 1)
-        out = np.asarray(chi2.logsf(np.minimum(statistic, 500.0), dof), np.float64)
+        out = np.log(chdtrc(dof, np.minimum(statistic, 500.0)))
         for k in np.flatnonzero(statistic > 500.0):
             out[k] = log_tail(float(statistic[k]), int(dof[k]))
         return np.where(self.dof > 0, out, 0.0)
 
     def limit(self, index: int) -> float:
         """The statistic at which a hypothesis alarms."""
-        return float(chi2.isf(self.hypotheses[index].alpha, max(int(self.dof[index]), 1)))
+        return float(chdtri(max(int(self.dof[index]), 1), self.hypotheses[index].alpha))
 
 
 def _reduced(hypotheses: Sequence[Hypothesis], linear: Linear) -> list[Floats]:

@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 from scipy.optimize import brentq
-from scipy.stats import chi2, ncx2
+from scipy.special import chdtrc, chndtr
 
 from calibration.adjustment.camera import INTERIOR, PER_CAMERA
 from calibration.adjustment.reliability import DELTA0
@@ -55,7 +55,7 @@ def noise_of(diagnosis: Diagnosis) -> Noise:
     safe = np.maximum(freedom, 1e-9)
     return Noise(
         np.where(freedom > 1.0, np.sqrt(squares / safe), 1.0),
-        np.where(freedom > 1.0, chi2.sf(squares, safe), 1.0),
+        np.where(freedom > 1.0, chdtrc(safe, squares), 1.0),
     )
 
 
@@ -269,5 +269,5 @@ def power95_factor(diagnosis: Diagnosis) -> float:
 @cache
 def _factor_at(limit: float) -> float:
     """The factor for a limit of the pose test: checks of one rig share it."""
-    noncentrality = brentq(lambda nc: ncx2.sf(limit, 6, nc) - 0.95, 1.0, 1000.0)
+    noncentrality = brentq(lambda nc: 0.05 - chndtr(limit, 6, nc), 1.0, 1000.0)
     return float(np.sqrt(noncentrality) / DELTA0)
