@@ -18,11 +18,11 @@ from threadpoolctl import threadpool_limits
 
 from common.errors import CancelledError
 from common.progress import CancelToken
+from common.threads import ONE_BLAS_THREAD
 from solver.near_optimum import run_near
 from solver.outer_loop import Report, StartResult, run_start
 from solver.problem import Problem
 
-_BLAS_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 _POLL_S = 0.05
 
 
@@ -43,8 +43,8 @@ class StartJob:
 @contextmanager
 def _single_threaded_children() -> Iterator[None]:
     """BLAS reads its thread count when it is loaded, so children must be born with it set."""
-    before = {name: os.environ.get(name) for name in _BLAS_VARIABLES}
-    os.environ.update(dict.fromkeys(_BLAS_VARIABLES, "1"))
+    before = {name: os.environ.get(name) for name in ONE_BLAS_THREAD}
+    os.environ.update(ONE_BLAS_THREAD)
     try:
         yield
     finally:

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from common.threads import ONE_BLAS_THREAD
+
 ROOT = Path(__file__).resolve().parents[1]
 ALLOW_NO_SKIP = "TESTS_ALLOW_NO_SKIP"
 PROVIDED = ("needs_browser", "needs_avr", "needs_aravis", "needs_genicam", "needs_gphoto2")
@@ -14,11 +16,9 @@ PROVIDED = ("needs_browser", "needs_avr", "needs_aravis", "needs_genicam", "need
 
 _wrongly_skipped: list[str] = []
 
-# As the service's processes have it. Tests run side by side, and libraries that start a thread
-# for each core in each of them wait for one another: the quick tests take several times as long.
-# Read when the libraries are loaded, which is after this.
-for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ.setdefault(_name, "1")
+# As commands and jobs have it; read when the libraries are loaded, which is after this.
+for _name, _count in ONE_BLAS_THREAD.items():
+    os.environ.setdefault(_name, _count)
 
 
 @pytest.hookimpl(hookwrapper=True)

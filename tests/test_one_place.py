@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -113,13 +114,25 @@ def divides_by_depth(node: ast.AST) -> bool:
     return same and ast.unparse(last) in ("2", "2:", "2:3", "-1", "-1:")
 
 
-def places(rule: Callable[[ast.AST], bool], root: Path = ROOT) -> Iterator[str]:
-    """Modules of the packages with a node that the rule finds."""
+RULES = (imports_opencv, distorts, divides_by_depth)
+
+
+@cache
+def places_of_rules(root: Path) -> dict[Callable[[ast.AST], bool], list[str]]:
+    """For each rule the modules of the packages with a node that it finds, read once."""
+    found: dict[Callable[[ast.AST], bool], list[str]] = {rule: [] for rule in RULES}
     for package in PACKAGES:
         for path in sorted((root / package).rglob("*.py")):
-            tree = ast.parse(path.read_text(encoding="utf-8"))
-            if any(rule(node) for node in ast.walk(tree)):
-                yield path.relative_to(root).as_posix()
+            nodes = list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
+            for rule in RULES:
+                if any(map(rule, nodes)):
+                    found[rule].append(path.relative_to(root).as_posix())
+    return found
+
+
+def places(rule: Callable[[ast.AST], bool], root: Path = ROOT) -> list[str]:
+    """Modules of the packages with a node that the rule finds."""
+    return places_of_rules(root)[rule]
 
 
 def test_opencv_is_called_in_named_modules_only() -> None:
@@ -161,12 +174,12 @@ def test_a_breach_would_be_found(
 ) -> None:
     (tmp_path / "solver").mkdir()
     (tmp_path / "solver" / "planted.py").write_text(breach, encoding="utf-8")
-    assert list(places(rule, tmp_path)) == ["solver/planted.py"]
+    assert places(rule, tmp_path) == ["solver/planted.py"]
 
 
-@pytest.mark.parametrize("rule", [imports_opencv, distorts, divides_by_depth])
+@pytest.mark.parametrize("rule", RULES)
 def test_what_is_no_breach_is_let_be(rule: Callable[[ast.AST], bool], tmp_path: Path) -> None:
     (tmp_path / "rig").mkdir()
     text = "k1, k2 = camera.distortion[:2]\nterms = [k1, k2]\nshare = size[0] / size[1]\n"
     (tmp_path / "rig" / "plain.py").write_text(text, encoding="utf-8")
-    assert not list(places(rule, tmp_path))
+    assert not places(rule, tmp_path)

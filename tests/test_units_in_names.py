@@ -9,6 +9,7 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -101,6 +102,7 @@ def _parameters(owner: str, node: ast.stmt) -> Iterator[str]:
             yield f"{owner}.{node.name}.{given.arg}"
 
 
+@cache
 def found(root: Path) -> set[str]:
     """Every quantity of the domain packages that lacks its unit."""
     out = set()

@@ -5,10 +5,12 @@ Only what the help needs is imported here; a command imports its own tools when 
 
 from __future__ import annotations
 
+import os
 from typing import Annotated
 
 import typer
 
+from common.threads import ONE_BLAS_THREAD
 from service.cli.commands.accept import accept
 from service.cli.commands.calibrate import calibrate
 from service.cli.commands.cameras import cameras
@@ -75,4 +77,6 @@ for group in (rig, trigger, sessions):
 
 def main() -> None:
     """Run the command line."""
+    for name, count in ONE_BLAS_THREAD.items():
+        os.environ.setdefault(name, count)
     app()

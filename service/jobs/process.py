@@ -15,6 +15,7 @@ from typing import IO
 
 from common.errors import CancelledError, InternalError, RigwrightError, TooLargeError
 from common.progress import CancelToken, Progress, ProgressCallback
+from common.threads import ONE_BLAS_THREAD
 from service.ipc import message_from_line, task_line
 from service.jobs.engine import Task
 from service.kinds.base import RequestT, ResultT
@@ -22,13 +23,6 @@ from service.logs import log
 
 TASKS_PROGRAM = "service.tasks"
 _POLL_S = 0.05
-_ONE_THREAD = {
-    "OMP_NUM_THREADS": "1",
-    "OPENBLAS_NUM_THREADS": "1",
-    "MKL_NUM_THREADS": "1",
-    "VECLIB_MAXIMUM_THREADS": "1",
-    "NUMEXPR_NUM_THREADS": "1",
-}
 
 
 class ProcessEngine:
@@ -106,7 +100,7 @@ def _process(
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=log_file,
-        env=os.environ | _ONE_THREAD,
+        env=os.environ | ONE_BLAS_THREAD,
         start_new_session=True,
     )
     try:

@@ -279,6 +279,7 @@ def test_the_wrong_reference_explains_nothing() -> None:
     assert result.kinds[0] in (Kind.UNEXPLAINED, Kind.CAMERA_MOVED)
 
 
+@pytest.mark.slow
 def test_statistics_of_an_unchanged_rig_are_chi_square_reference_error_included() -> None:
     """The pose statistics over many draws of reference and images: exactly chi-square(6)."""
     bench = Bench.of(0.1, rings=30, check_frames=2)

@@ -51,7 +51,7 @@ def test_a_corner_out_of_its_place_is_still_thrown_out() -> None:
     assert plate.ids[31] not in found.ids
 
 
-@pytest.mark.parametrize("legacy", [True, False])
+@pytest.mark.parametrize("legacy", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_a_large_plate_of_the_other_pattern_is_explained(legacy: bool) -> None:
     made = CharucoPlate("plate", 19, 18, 10.0, 7.5, "DICT_5X5_250", legacy=not legacy)
     image, _ = shot(made, wide(1500.0, [0.0] * 5), np.eye(3), 360.0)

@@ -121,6 +121,8 @@ EXPORT = "rigwright export my-rig --format colmap-text --out my-colmap"
 def test_the_first_hour_runs_as_printed(tmp_path: Path) -> None:
     assert len(steps()) >= 20
     assert len(list(walked(steps(), tmp_path, programs()))) == len(steps())
+    demo = {path.name for path in (tmp_path / "demo").iterdir()}
+    assert demo > {"design.json", "report.html", "head.ply", "face.toml", "station.toml"}
     for shot, told in json.loads(PICTURES.read_text(encoding="utf-8")).items():
         source = next(s.source for s in SHOTS if s.name == shot)
         made = headings_of(tmp_path / source) if source.endswith("html") else []

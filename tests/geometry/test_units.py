@@ -40,11 +40,11 @@ def real_head() -> Scan:
 each_axes = pytest.mark.parametrize(
     "axes",
     [
-        pytest.param(a, id=f"{a.up}{a.front}", marks=[pytest.mark.slow] if k % 6 else [])
+        pytest.param(a, id=f"{a.up}{a.front}", marks=[pytest.mark.slow] if k % 12 else [])
         for k, a in enumerate(ALL_AXES)
     ],
 )
-"""All 24; a sixth of them, with another axis up each, in every run."""
+"""All 24; two of them in every run."""
 
 
 def test_there_are_24_axes_and_each_is_a_rotation() -> None:
@@ -77,6 +77,7 @@ def test_axes_and_units_of_the_real_head_are_found(tmp_path: Path, axes: Axes) -
     assert scan.extents_mm == pytest.approx(upright.extents_mm, abs=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.real_scan
 def test_the_real_head_gets_the_size_of_a_head() -> None:
     scan = real_head()
@@ -91,6 +92,7 @@ def test_the_real_head_gets_the_size_of_a_head() -> None:
     assert 140.0 < np.ptp(level[:, 0]) < 170.0
 
 
+@pytest.mark.slow
 @pytest.mark.real_scan
 @pytest.mark.parametrize("tall", [True, False])
 def test_the_head_part_ends_at_the_neck_only_with_shoulders(tall: bool) -> None:
@@ -131,6 +133,7 @@ def test_gltf_with_other_axes_than_prescribed_is_turned_as_its_face(tmp_path: Pa
     assert scan.extents_mm == pytest.approx(plain_head().extents, abs=1e-2)
 
 
+@pytest.mark.slow
 def test_impossible_sizes_are_scaled_with_a_warning(tmp_path: Path) -> None:
     head = plain_head()
     head.apply_scale(30.0)
@@ -164,7 +167,10 @@ def test_a_scale_overrides_units(tmp_path: Path) -> None:
     assert scan.extents_mm == pytest.approx(1.1 * plain_head().extents, rel=1e-4)
 
 
-@pytest.mark.parametrize("solid", ["sphere", "box", "cylinder"])
+@pytest.mark.parametrize(
+    "solid",
+    ["sphere", *(pytest.param(solid, marks=pytest.mark.slow) for solid in ("box", "cylinder"))],
+)
 def test_a_shape_without_a_face_asks_for_axes(tmp_path: Path, solid: str) -> None:
     shapes = {
         "sphere": trimesh.creation.icosphere(subdivisions=4, radius=120.0),

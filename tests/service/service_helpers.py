@@ -112,10 +112,10 @@ def files_under(folder: Path) -> list[Path]:
     return sorted(Path(where) / name for where, _, names in os.walk(folder) for name in names)
 
 
-def rigwright_here(*arguments: object, cwd: Path) -> subprocess.CompletedProcess[str]:
+def rigwright_here(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
     """The command, its task too, in this process: loading everything anew takes two seconds."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.chdir(cwd)
+        patch.chdir(cwd or Path.cwd())
         patch.setattr(running_tasks, "ProcessEngine", InThisProcess)
         done = CliRunner().invoke(app, [str(argument) for argument in arguments])
     if done.exception is not None and not isinstance(done.exception, SystemExit):

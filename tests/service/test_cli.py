@@ -103,9 +103,7 @@ def test_bad_input_gets_one_line_and_leaves_nothing(
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "kept.txt").write_text("kept")
     before = files_under(tmp_path)
-    # A server is begun in a process of its own; the others are refused alike in this one.
-    run = rigwright if arguments[0] == "serve" else rigwright_here
-    done = run(*arguments, cwd=tmp_path)
+    done = rigwright_here(*arguments, cwd=tmp_path)
     assert done.returncode == 2, done.stderr
     (line,) = done.stderr.splitlines()
     assert line.startswith("rigwright: ")
@@ -115,15 +113,16 @@ def test_bad_input_gets_one_line_and_leaves_nothing(
     assert not (tmp_path / "out").exists()
 
 
-def test_a_misspelt_setting_is_not_ignored(tmp_path: Path) -> None:
-    done = rigwright("serve", "--data", tmp_path, env=os.environ | {"RIGWRIGHT_PROT": "9000"})
+def test_a_misspelt_setting_is_not_ignored(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("RIGWRIGHT_PROT", "9000")
+    done = rigwright_here("serve", "--data", tmp_path)
     assert done.returncode == 2
     assert "there is no setting RIGWRIGHT_PROT" in done.stderr
 
 
 def test_wrong_usage_is_bad_input() -> None:
-    assert rigwright("design").returncode == 2
-    assert rigwright("desing").returncode == 2
+    assert rigwright_here("design").returncode == 2
+    assert rigwright_here("desing").returncode == 2
 
 
 class TestNewFolder:
@@ -272,7 +271,9 @@ class TestServe:
 
         return start
 
-    @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+    @pytest.mark.parametrize(
+        "number", [pytest.param(signal.SIGINT, marks=pytest.mark.slow), signal.SIGTERM]
+    )
     def test_it_says_where_it_is_answers_and_stops(
         self, serve: Callable[..., subprocess.Popen[str]], number: signal.Signals
     ) -> None:

@@ -23,6 +23,7 @@ from service_helpers import (
     StartServer,
     TestClient,
     files_under,
+    rigwright_here,
     small_rig_text,
     wait_for,
 )
@@ -143,6 +144,7 @@ class TestOverHttp:
         assert fractions == sorted(fractions)
         assert data[-1]["result"] == completed["result"]
 
+    @pytest.mark.slow
     def test_the_same_seed_gives_the_same_cameras(
         self, http: TestClient, scan_id: str, small_rig: JSON, completed: JSON
     ) -> None:
@@ -155,6 +157,7 @@ class TestOverHttp:
         assert first["cameras"] == second["cameras"]
         assert first["quality"] == second["quality"]
 
+    @pytest.mark.slow
     def test_overrides_win_over_the_rig(
         self, http: TestClient, scan_id: str, small_rig: JSON
     ) -> None:
@@ -325,7 +328,7 @@ class TestOnTheCommandLine:
         text = rig_file.read_text()
         assert before in text
         rig_file.write_text(text.replace(before, after))
-        done = self.run("design", head, "--rig", rig_file, "--out", tmp_path / "out")
+        done = rigwright_here("design", head, "--rig", rig_file, "--out", tmp_path / "out")
         assert done.returncode == 2
         assert words in done.stderr
         assert len(done.stderr.splitlines()) <= 2  # progress may have begun
@@ -335,7 +338,7 @@ class TestOnTheCommandLine:
         scan = tmp_path / "head.glb"
         scan.write_bytes(b"PK\x03\x04 no mesh")
         before = files_under(tmp_path)
-        done = self.run("design", scan, "--rig", rig_file, "--out", tmp_path / "out")
+        done = rigwright_here("design", scan, "--rig", rig_file, "--out", tmp_path / "out")
         assert done.returncode == 2, done.stderr
         assert done.stderr.splitlines()[-1].startswith("rigwright: ")
         assert "Traceback" not in done.stderr
@@ -371,19 +374,3 @@ class TestOnTheCommandLine:
         process.stderr.close()
         assert not out.exists()
         assert sorted(path.name for path in tmp_path.iterdir()) == ["rig.toml"]
-
-    @pytest.mark.slow
-    @pytest.mark.timeout(1200)
-    def test_the_demo(self, tmp_path: Path) -> None:
-        done = self.run("demo", "--out", tmp_path / "demo", "--json")
-        assert done.returncode == 0, done.stderr
-        names = set(files_of(tmp_path / "demo"))
-        assert names == {*FILE_NAMES, "head.ply", "face.toml", "station.toml"}
-        again = self.run(
-            "evaluate",
-            tmp_path / "demo/design.json",
-            tmp_path / "demo/head.ply",
-            "--rig",
-            tmp_path / "demo/face.toml",
-        )
-        assert again.returncode == 0, again.stderr

@@ -148,6 +148,7 @@ def test_the_service_stops_at_once_while_requests_are_half_sent(start_server: St
         one.close()
 
 
+@pytest.mark.slow
 def test_nor_does_it_wait_for_who_takes_no_answer(start_server: StartServer) -> None:
     server = start_server()
     request = "GET /v1/counts/endless HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"
@@ -161,6 +162,7 @@ def test_nor_does_it_wait_for_who_takes_no_answer(start_server: StartServer) -> 
         one.close()
 
 
+@pytest.mark.slow
 def test_a_head_that_never_ends_is_let_go(start_server: StartServer) -> None:
     server = start_server()
     opened = half_sent(server, "GET /v1/health HTTP/1.1\r\nHost: ")

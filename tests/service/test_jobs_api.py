@@ -170,6 +170,7 @@ class TestEvents:
             "application/problem+json",
         )
 
+    @pytest.mark.slow
     def test_open_streams_do_not_hold_up_the_shutdown(self, start_server: StartServer) -> None:
         server = start_server()
         with server.client() as client:
@@ -265,6 +266,7 @@ class TestDurability:
             start_server(tmp_path / "data")
 
 
+@pytest.mark.slow
 def test_the_service_answers_at_once_while_a_job_runs(start_server: StartServer) -> None:
     with start_server().client() as client:
         location = count(client, 10_000, step_s=0.0)

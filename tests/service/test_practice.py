@@ -102,6 +102,7 @@ def test_a_capture_outside_a_session_has_no_number() -> None:
     assert ArmSpec("self-test", 1, 1.0).number == 0
 
 
+@pytest.mark.slow
 def test_the_command_writes_them_and_says_what_comes_next(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from service_helpers import RIGWRIGHT, rigwright, wait_for
+from service_helpers import RIGWRIGHT, rigwright_here, wait_for
 from stations import write_station
 
 from rig.acquisition.station.stationfile import read_station
@@ -44,7 +44,7 @@ def pulses(box: FakeTrigger) -> int:
 
 @pytest.mark.parametrize("command", COMMANDS, ids=" ".join)
 def test_every_command_shows_an_example(command: list[str]) -> None:
-    done = rigwright(*command, "--help")
+    done = rigwright_here(*command, "--help")
     assert done.returncode == 0
     assert f"rigwright {' '.join(command)}" in " ".join(done.stdout.split()).partition("Example")[2]
 
@@ -54,32 +54,33 @@ def test_a_capture_is_filed_and_proven_whole(
 ) -> None:
     session = tmp_path / "anna"
     asked = ["capture", "--station", station, "--session", session, "--id", "one", "--json"]
-    done = rigwright(*asked)
+    done = rigwright_here(*asked)
     assert done.returncode == 0, done.stderr
     answer = json.loads(done.stdout)
     assert (answer["capture"], answer["state"]) == ("one", "complete")
     assert all(Path(picture).is_file() for picture in answer["pictures"])
     assert "100 % committed" in done.stderr
-    assert rigwright(*asked).returncode == 0  # the id is known: nothing is fired
+    assert rigwright_here(*asked).returncode == 0  # the id is known: nothing is fired
     assert pulses(box) == 1
-    verified = rigwright("sessions", "verify", session)
+    verified = rigwright_here("sessions", "verify", session)
     assert verified.returncode == 0
     assert verified.stdout.endswith("whole\n")
     Path(answer["pictures"][0]).write_bytes(b"another picture")
-    changed = rigwright("sessions", "verify", session)
+    changed = rigwright_here("sessions", "verify", session)
     assert changed.returncode == 2
     assert "changed: images/rig1/cam01/000001.jpg" in changed.stdout
     assert changed.stderr.startswith("rigwright: ")
 
 
 def test_a_dry_run_fires_and_files_nothing(tmp_path: Path, station: Path, box: FakeTrigger) -> None:
-    done = rigwright("capture", "--station", station, "--dry-run", cwd=tmp_path)
+    done = rigwright_here("capture", "--station", station, "--dry-run", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "cam01" in done.stdout
     assert pulses(box) == 0
     assert not (tmp_path / "sessions").exists()
 
 
+@pytest.mark.slow
 def test_ctrl_c_ends_a_burst_and_files_nothing(
     tmp_path: Path, station: Path, box: FakeTrigger
 ) -> None:
@@ -95,7 +96,7 @@ def test_ctrl_c_ends_a_burst_and_files_nothing(
     process.stderr.close()
     assert pulses(box) < 60
     assert json.loads((tmp_path / "s" / "session.json").read_text())["captures"] == []
-    assert rigwright("sessions", "verify", tmp_path / "s").returncode == 0
+    assert rigwright_here("sessions", "verify", tmp_path / "s").returncode == 0
 
 
 def test_devices_that_another_process_has_are_refused_with_its_name(
@@ -107,7 +108,7 @@ def test_devices_that_another_process_has_are_refused_with_its_name(
         stderr=subprocess.DEVNULL,
     )  # fmt: skip
     wait_for(lambda: pulses(box) >= 1)
-    refused = rigwright("capture", "--station", station, "--session", tmp_path / "t")
+    refused = rigwright_here("capture", "--station", station, "--session", tmp_path / "t")
     process.terminate()
     process.wait(10.0)
     assert refused.returncode == 2
@@ -119,38 +120,38 @@ def test_devices_that_another_process_has_are_refused_with_its_name(
 def test_a_rig_check_measures_lags_and_writes_delays(tmp_path: Path, box: FakeTrigger) -> None:
     lag = "\n[simulation.faults.cam02]\nlag_mean_us = 3000.0\n"
     station = write_station(tmp_path / "in", url=box.url, more=lag)
-    quiet = rigwright("rig", "check", "--station", station, "--no-fire")
+    quiet = rigwright_here("rig", "check", "--station", station, "--no-fire")
     assert quiet.returncode == 0, quiet.stdout
     assert pulses(box) == 0
-    first = rigwright("rig", "check", "--station", station, "--captures", "1", "--write")
+    first = rigwright_here("rig", "check", "--station", station, "--captures", "1", "--write")
     assert first.returncode == 5, "written, and to be checked again"
     assert "cam02: lag 3.00 ms" in first.stdout
     assert read_station(station).camera("cam01").delay_us == pytest.approx(3000.0, abs=100.0)
-    again = rigwright("rig", "check", "--station", station, "--captures", "1", "--json")
+    again = rigwright_here("rig", "check", "--station", station, "--captures", "1", "--json")
     assert again.returncode == 0, again.stdout
     assert json.loads(again.stdout)["sync_check"]["ok"] is True
 
 
 class TestBoxes:
     def test_a_self_test_tells_who_answers(self, box: FakeTrigger) -> None:
-        done = rigwright("trigger", "selftest", "--url", box.url)
+        done = rigwright_here("trigger", "selftest", "--url", box.url)
         assert done.returncode == 0, done.stderr
         assert "Rigwright,TriggerBox" in done.stdout
         assert "state: ready; interlock: closed" in done.stdout
 
     def test_an_open_interlock_is_not_well(self, box: FakeTrigger) -> None:
         box.box.set_interlock(False)
-        done = rigwright("trigger", "selftest", "--url", box.url, "--json")
+        done = rigwright_here("trigger", "selftest", "--url", box.url, "--json")
         assert done.returncode == 4
         assert json.loads(done.stdout)["ok"] is False
 
     def test_no_box_is_told_in_one_line(self, tmp_path: Path) -> None:
-        done = rigwright("trigger", "selftest", "--url", tmp_path / "nothing")
+        done = rigwright_here("trigger", "selftest", "--url", tmp_path / "nothing")
         assert done.returncode == 4
         (line,) = done.stderr.splitlines()
         assert line.startswith("rigwright: ")
         assert "nothing" in line
-        assert rigwright("trigger", "selftest").returncode == 2
+        assert rigwright_here("trigger", "selftest").returncode == 2
 
     def test_the_fake_box_of_the_command_line_answers(self, tmp_path: Path) -> None:
         link = tmp_path / "box"
@@ -160,7 +161,7 @@ class TestBoxes:
         )  # fmt: skip
         assert process.stdout is not None
         assert str(link) in process.stdout.readline()
-        done = rigwright("trigger", "selftest", "--url", link)
+        done = rigwright_here("trigger", "selftest", "--url", link)
         process.send_signal(signal.SIGINT)
         assert process.wait(10.0) == 0
         process.stdout.close()
@@ -182,7 +183,7 @@ class TestBoxes:
 def test_bad_input_gets_one_line(tmp_path: Path, arguments: list[str], words: str) -> None:
     wrong = write_station(tmp_path / "in").read_text().replace("[trigger]", "[triger]")
     (tmp_path / "wrong.toml").write_text(wrong)
-    done = rigwright(*arguments, cwd=tmp_path)
+    done = rigwright_here(*arguments, cwd=tmp_path)
     assert done.returncode == 2
     (line,) = done.stderr.splitlines()
     assert line.startswith("rigwright: ")

@@ -202,6 +202,7 @@ class TestOnARealServer:
         parts = urlsplit(url)
         return socket.create_connection((parts.hostname, parts.port), timeout=10.0)
 
+    @pytest.mark.slow
     def test_two_gigabytes_are_refused_without_being_read(
         self, start_server: StartServer, tmp_path: Path
     ) -> None:

@@ -161,6 +161,7 @@ def test_fixed_cameras_stay_and_count() -> None:
     assert found.feasible, found.quality.violated
 
 
+@pytest.mark.slow
 def test_zones_are_respected_by_whole_bodies() -> None:
     zones = Zones(
         allowed=(Box(np.array([-700.0, -1300.0, -250.0]), np.array([700.0, -200.0, 600.0])),),

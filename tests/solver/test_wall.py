@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
+import pytest
 import rigs
 
 from solver.coverage.views import in_frame
@@ -70,6 +71,7 @@ def test_bounds_bind_as_in_the_paper() -> None:
     assert {"bound_x/cam01", "bound_x/cam03"} <= binding
 
 
+@pytest.mark.slow
 def test_without_the_frame_cameras_move_in_and_lose_targets() -> None:
     whole, without = solved("all"), solved("no frame")
     distance = [d.quality.cameras.distance_mm.mean() for d in (whole, without)]
@@ -93,6 +95,7 @@ def test_without_centring_images_are_off_centre_but_the_rest_holds() -> None:
     assert without.quality.cost_mm2 < solved("all").quality.cost_mm2
 
 
+@pytest.mark.slow
 def test_without_the_minimum_base_height_pairs_cluster() -> None:
     def least(found: Design) -> float:
         table = base_height_table(found.cameras, rigs.WALL_TARGETS_MM.mean(axis=0))

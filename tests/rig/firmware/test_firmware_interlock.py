@@ -60,8 +60,13 @@ def test_no_edge_begins_after_the_interlock_opened(
 @pytest.mark.slow
 @pytest.mark.parametrize("flood", [False, True], ids=["quiet", "flood"])
 @pytest.mark.parametrize("train", TRAINS)
-def test_no_edge_begins_whenever_it_opens(box: FirmwareSim, train: str, flood: bool) -> None:
-    worst(box, train, flood, range(-60, 1200, 4))
+def test_no_edge_begins_whenever_it_opens(one_box: FirmwareSim, train: str, flood: bool) -> None:
+    worst(one_box, train, flood, range(-60, 1200, 4))
+
+
+@pytest.mark.slow
+def test_another_processor_stops_as_soon(js_box: FirmwareSim) -> None:
+    worst(js_box, "mixed", True, range(-58, 1200, 12))
 
 
 def worst(box: FirmwareSim, train: str, flood: bool, moments_us: range) -> None:

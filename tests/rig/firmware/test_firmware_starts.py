@@ -179,6 +179,7 @@ def test_a_result_gone_bad_is_forgotten_not_believed(one_box: FirmwareSim) -> No
     assert one_box.ask("RES? cap=a") == "ERR 250 unknown"
 
 
+@pytest.mark.slow
 def test_a_reset_at_any_moment_of_a_burst_tells_the_truth(box: FirmwareSim) -> None:
     # What the box says afterwards against what a logic analyser saw.
     draw = random.Random(5)  # noqa: S311 - repeatable moments, not secrets
@@ -220,6 +221,7 @@ def test_the_name_survives_power_loss(box: FirmwareSim) -> None:
     assert ",north-rig.2," in box.ask("*IDN?")
 
 
+@pytest.mark.slow
 def test_a_power_loss_while_a_name_is_written_leaves_a_whole_one(js_box: FirmwareSim) -> None:
     box = js_box
     names = ["first", "the-second.name", "3"]

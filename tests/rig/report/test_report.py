@@ -218,6 +218,7 @@ class Visit:
         self.view = json.loads(self.page.evaluate("document.body.dataset.view"))
 
 
+@pytest.mark.slow
 @pytest.mark.needs_browser
 def test_a_browser_draws_it(
     page: str, design: Design, subject: Subject, browser: Browser, tmp_path: Path

@@ -150,6 +150,7 @@ def test_an_edge_within_a_pixel_gives_the_share_of_the_pixel(tmp_path: Path) -> 
     assert np.abs(sums[0] - np.array(sums) - steps).max() < 1.0 / 16.0
 
 
+@pytest.mark.slow
 def test_a_target_hides_the_head_and_its_back_shows_no_code(tmp_path: Path) -> None:
     picture = np.full((50, 80, 3), (250, 10, 10), dtype=np.uint8)
     path = tmp_path / "red.png"

@@ -45,6 +45,7 @@ def test_every_pixels_ray_projects_back_to_it(width_px: int, distortion: tuple[f
         assert moved > 2.0, "the distortion must have been felt"
 
 
+@pytest.mark.slow
 def test_rays_within_a_pixel_agree_too() -> None:
     camera = lens(2000, 40.0, STRONG)
     table = ray_table(camera)

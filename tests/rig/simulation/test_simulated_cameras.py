@@ -484,6 +484,7 @@ if __name__ == "__main__":
 """
 
 
+@pytest.mark.slow
 def test_processes_render_what_a_thread_renders(tmp_path: Path) -> None:
     script = tmp_path / "run.py"
     script.write_text(SCRIPT)
@@ -497,6 +498,7 @@ def test_processes_render_what_a_thread_renders(tmp_path: Path) -> None:
     assert lines[0] != lines[1]
 
 
+@pytest.mark.slow
 def test_processes_end_when_their_parent_is_killed(tmp_path: Path) -> None:
     script = tmp_path / "run.py"
     script.write_text(SCRIPT)

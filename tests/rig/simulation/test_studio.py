@@ -48,6 +48,7 @@ def test_the_outline_is_where_the_surface_projects(studio: Studio) -> None:
     assert np.abs(found - wanted).max() < 3.0
 
 
+@pytest.mark.slow
 def test_a_moving_head_is_displaced_by_velocity_times_time(studio: Studio) -> None:
     """What skew looks like: two exposures 25 ms apart show the head 3 mm to the side."""
     quiet = Studio(tuple(studio.cameras.values()), studio.scene, SensorSettings(1e6, 0.5))

@@ -34,6 +34,7 @@ def read(address: str) -> object:
         return json.load(answer)
 
 
+@pytest.mark.slow
 def test_a_capture_is_seen_by_everybody_at_the_rig(
     visits: tuple[Visit, Visit], address: str
 ) -> None:
@@ -83,6 +84,7 @@ def test_views_of_an_empty_service(visits: tuple[Visit, Visit], view: str) -> No
     one.sound()
 
 
+@pytest.mark.slow
 def test_the_page_works_behind_a_proxy(tmp_path: Path) -> None:
     station = write_station(tmp_path / "rig")
     behind = served(tmp_path / "data", station, more=("--root-path", "/lab"))

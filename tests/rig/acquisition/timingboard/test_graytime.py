@@ -34,6 +34,7 @@ def test_shares_are_those_of_the_counter_itself(bits: int, start: float, length:
     assert np.abs(found - lit.sum(axis=0) / length).max() < 1e-6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("length", [0.1, 0.7, 2.3, 10.0, 40.0, 250.0])
 @pytest.mark.parametrize("known", [False, True])
 def test_errors_are_as_large_as_stated(length: float, known: bool) -> None:
