@@ -11,6 +11,7 @@ from calibration.detection.detections import Point
 from calibration.detection.gates import Gates, Rejection, Rule
 from calibration.detection.planes import straightened
 from calibration.observations import Carrier
+from calibration.targets.boards import Board
 from calibration.targets.kinds import CharucoPlate, TargetPlan
 from geometry.arrays import Bools, Floats
 
@@ -29,7 +30,7 @@ def carrier_strangers(
     seen = {p.target: p for p in points}
     rejections: list[Rejection] = []
     for kind in plan.carriers:
-        if isinstance(kind, CharucoPlate):
+        if isinstance(kind, CharucoPlate | Board):
             continue
         carrier = kind.carrier()
         known = np.asarray(np.isfinite(carrier.sigma_mm).all(axis=1))

@@ -4,16 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import numpy as np
+
 from calibration.detection import opencv
+from calibration.detection.boarddiagnosis import (
+    chessboard_layout,
+    corner_squares,
+    grid_layout,
+)
 from calibration.detection.detections import PictureProblem
 from calibration.detection.gates import Gates
 from calibration.detection.images import Picture
 from calibration.detection.opencv import Markers
-from calibration.detection.plates import LAYOUT_AGREEMENT, agreeing, believable, plane_markers
+from calibration.detection.plates import (
+    LAYOUT_AGREEMENT,
+    agreeing,
+    believable,
+    marker_share,
+    plane_markers,
+)
 from calibration.detection.rings import mirrored_codes, ring_dots
 from calibration.detection.seeing import MarkerSearch
+from calibration.targets.boards import MOST_SQUARES, AprilGrid, Chessboard
 from calibration.targets.kinds import (
-    MOST_SQUARES,
     CharucoPlate,
     MarkerCarrier,
     RingCarrier,
@@ -23,6 +36,7 @@ from calibration.targets.kinds import (
 
 _ENOUGH_MARKERS = 4
 _MOST_COLUMNS = 30
+_SIZE_SHARE, _SIZE_PX = 0.05, 3.0
 FEW = 8
 """Some codes look the same in a mirror: a few targets can be found in a mirrored picture."""
 
@@ -42,9 +56,15 @@ def diagnose(
         if isinstance(plate, CharucoPlate)
         and (finding := plate_layout(sights[plate.inverted], plate)) is not None
     ]
+    findings += [
+        finding
+        for grid in plan.carriers
+        if isinstance(grid, AprilGrid)
+        and (finding := grid_layout(sights[grid.inverted], grid)) is not None
+    ]
     if findings or found > FEW:
         return tuple(findings)
-    questions = (_mirrored,) if found else (_mirrored, _inverted, _other_dictionary)
+    questions = (_mirrored,) if found else (_mirrored, _boards, _inverted, _other_dictionary)
     for question in questions:
         answer = question(sights, plan, gates, found)
         if answer is not None:
@@ -56,9 +76,26 @@ def plate_layout(sight: MarkerSearch, plate: CharucoPlate) -> PictureProblem | N
     """Whether the markers seen lie as on another plate than the one described."""
     markers = sight.markers(plate.dictionary, (plate,))
     own, _ = plane_markers(plate, markers)
-    if len(own) < _ENOUGH_MARKERS or believable(plate, markers):
+    if len(own) < _ENOUGH_MARKERS:
         return None
-    return other_layout(plate, markers)
+    return _marker_size(plate, own) if believable(plate, markers) else other_layout(plate, markers)
+
+
+def _marker_size(plate: CharucoPlate, own: Markers) -> PictureProblem | None:
+    """Whether markers are of another size for their squares than described."""
+    share = marker_share(plate, own)
+    told = plate.marker_mm / plate.square_mm
+    side = np.linalg.norm(own.corners_px - np.roll(own.corners_px, 1, axis=1), axis=2)
+    # Corners as first found are about a pixel inside, and the lens bends the plane.
+    room = _SIZE_SHARE + _SIZE_PX / float(np.median(side))
+    if share is None or abs(share / told - 1.0) < room:
+        return None
+    return PictureProblem(
+        "marker-size",
+        f"the markers of plate {plate.name!r} are about {share:.2f} of a square, marker_mm = "
+        f"{plate.marker_mm:g} and square_mm = {plate.square_mm:g} say {told:.2f}",
+        "measure both on the plate and correct them in the target file",
+    )
 
 
 def other_layout(plate: CharucoPlate, markers: Markers) -> PictureProblem:
@@ -124,6 +161,18 @@ def _variant(plate: CharucoPlate, columns: int, legacy: bool) -> CharucoPlate | 
     )
 
 
+def _boards(
+    sights: Mapping[bool, MarkerSearch], plan: TargetPlan, gates: Gates, found: int
+) -> PictureProblem | None:
+    del gates, found
+    for board in plan.carriers:
+        if isinstance(board, Chessboard):
+            finding = chessboard_layout(sights[board.inverted], board)
+            if finding is not None:
+                return finding
+    return corner_squares(sights, plan)
+
+
 def _mirrored(
     sights: Mapping[bool, MarkerSearch], plan: TargetPlan, gates: Gates, found: int
 ) -> PictureProblem | None:
@@ -160,10 +209,15 @@ def _inverted(
 
 def _known_markers(picture: Picture, plan: TargetPlan, inverted: bool) -> int:
     count = 0
-    wanted = {n for c in plan.carriers if c.inverted == inverted for n in marker_numbers(c)}
-    for dictionary in sorted({name for name, _ in wanted}):
-        numbers = opencv.detect_markers(picture.grey, dictionary).ids.tolist()
-        count += sum((dictionary, n) in wanted for n in numbers)
+    wanted = {
+        (dictionary, c.border_modules if isinstance(c, AprilGrid) else 1, number)
+        for c in plan.carriers
+        if c.inverted == inverted
+        for dictionary, number in marker_numbers(c)
+    }
+    for dictionary, border in sorted({(name, border) for name, border, _ in wanted}):
+        found = opencv.detect_markers(picture.grey, dictionary, border_modules=border)
+        count += sum((dictionary, border, n) in wanted for n in found.ids.tolist())
     return count
 
 
@@ -171,7 +225,7 @@ def _other_dictionary(
     sights: Mapping[bool, MarkerSearch], plan: TargetPlan, gates: Gates, found: int
 ) -> PictureProblem | None:
     del gates, found
-    carriers = [c for c in plan.carriers if isinstance(c, CharucoPlate | MarkerCarrier)]
+    carriers = [c for c in plan.carriers if isinstance(c, CharucoPlate | AprilGrid | MarkerCarrier)]
     if not carriers:
         return None
     mine = sorted({c.dictionary for c in carriers})

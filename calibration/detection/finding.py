@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from calibration.detection.boards import (
+    april_grid_points,
+    chessboard_points,
+    dot_grid_points,
+)
 from calibration.detection.carriers import carrier_strangers
 from calibration.detection.detections import Detections, PictureProblem, Point
 from calibration.detection.diagnosis import diagnose
@@ -17,8 +22,10 @@ from calibration.detection.images import Picture, picture_from, read_picture
 from calibration.detection.markers import marker_points
 from calibration.detection.opencv import AnyImage, Markers
 from calibration.detection.plates import plate_points
+from calibration.detection.ringreading import find_dots
 from calibration.detection.rings import ring_dots, ring_points
 from calibration.detection.seeing import MarkerSearch
+from calibration.targets.boards import AprilGrid, Chessboard, DotGrid
 from calibration.targets.kinds import (
     CarrierKind,
     CharucoPlate,
@@ -56,6 +63,7 @@ def _found(picture: Picture, plan: TargetPlan, gates: Gates, explain: bool) -> D
         for part in (
             _square_targets(sight, carriers, gates),
             _rings(sight.picture, carriers, gates),
+            *_boards(sight, carriers, gates),
         ):
             points += part[0]
             rejections += part[1]
@@ -129,6 +137,23 @@ def _rings(
     if not rings:
         return [], []
     return ring_points(picture, ring_dots(picture, gates), rings, gates)
+
+
+def _boards(
+    sight: MarkerSearch, carriers: Sequence[CarrierKind], gates: Gates
+) -> Iterator[tuple[list[Point], list[Rejection]]]:
+    picture = sight.picture
+    for board in carriers:
+        if isinstance(board, Chessboard):
+            yield chessboard_points(picture, board, gates)
+        elif isinstance(board, DotGrid):
+            dots = find_dots(picture.grey, gates.smallest_dot_px)
+            yield dot_grid_points(picture, board, dots, gates)
+        elif isinstance(board, AprilGrid):
+            seen = sight.markers(board.dictionary, carriers, board.border_modules)
+            markers, doubles = once(seen)
+            found = april_grid_points(picture, board, markers, gates)
+            yield found[0], found[1] + doubles
 
 
 def _unique(points: Sequence[Point]) -> tuple[list[Point], list[Rejection]]:

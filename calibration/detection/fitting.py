@@ -33,11 +33,17 @@ class Fitted:
 
 
 def fit_target(
-    picture: Picture, pattern: Pattern, start: Floats, detail_px: float, gates: Gates
+    picture: Picture,
+    pattern: Pattern,
+    start: Floats,
+    detail_px: float,
+    gates: Gates,
+    held_map: bool = False,
 ) -> Fitted | tuple[Rule, float, float]:
     """Fit a target, or the rule that it breaks with what was measured and the limit.
 
     ``detail_px`` is the size of its details in the picture, which the blur is compared with.
+    ``held_map``: how the target lies is known from ``start``, only where it is is not.
     """
     cut = _cut(picture, pattern, start, gates)
     if not isinstance(cut, Window):
@@ -47,7 +53,7 @@ def fit_target(
         return Rule.SATURATION, clipped, gates.saturated_share
     factor = max(1, round(max(cut.values.shape) / LARGEST_WINDOW_PX))
     window = cut.binned(factor) if factor > 1 else cut
-    fit = fit_template(pattern, window, start, picture.size_px)
+    fit = fit_template(pattern, window, start, picture.size_px, held_map)
     if fit is None or not fit.converged:
         return Rule.FIT, 1.0, gates.misfit
     if fit.step < gates.contrast:

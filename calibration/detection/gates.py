@@ -23,6 +23,7 @@ class Rule(Enum):
     FIT = "fit"
     HOMOGRAPHY = "homography"
     POSE = "pose"
+    UPRIGHT = "upright"
 
     @property
     def meaning(self) -> str:
@@ -41,6 +42,7 @@ _MEANINGS = {
     Rule.FIT: "the picture looks like the target that was printed",
     Rule.HOMOGRAPHY: "it lies where its neighbours on the same plane say",
     Rule.POSE: "it lies where the other targets of its carrier say",
+    Rule.UPRIGHT: "a board that looks the same when it is turned is held upright",
 }
 
 

@@ -80,12 +80,15 @@ def marker_modules(name: str, number: int) -> Bools:
     return np.asarray(dictionary.generateImageMarker(number, side, borderBits=1) > 127)
 
 
-def detect_markers(grey: Bytes, dictionary: str, refine: bool = False) -> Markers:
-    """Markers of one dictionary in an 8-bit grey picture.
+def detect_markers(
+    grey: Bytes, dictionary: str, refine: bool = False, border_modules: int = 1
+) -> Markers:
+    """Markers of one dictionary in an 8-bit grey picture, their black border so many modules wide.
 
     Corners as found (about a pixel), or refined by OpenCV (about a quarter).
     """
     parameters = cv2.aruco.DetectorParameters()
+    parameters.markerBorderBits = border_modules
     parameters.cornerRefinementMethod = (
         cv2.aruco.CORNER_REFINE_SUBPIX if refine else cv2.aruco.CORNER_REFINE_NONE
     )
@@ -100,6 +103,51 @@ def detect_markers(grey: Bytes, dictionary: str, refine: bool = False) -> Marker
         return Markers(np.zeros(0, dtype=np.int64), np.zeros((0, 4, 2)))
     places = np.asarray(corners, dtype=np.float64).reshape(-1, 4, 2)
     return Markers(np.asarray(ids, dtype=np.int64).reshape(-1), places)
+
+
+def chessboard_corners(grey: Bytes, columns: int, rows: int) -> Floats | None:
+    """Inner corners (rows * columns, 2) of a whole chessboard, about; None when there is none.
+
+    The first is one of the outer four, and rows may run either way.
+    """
+    found, corners = cv2.findChessboardCornersSB(
+        grey, (columns, rows), flags=cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_EXHAUSTIVE
+    )
+    return _grid_of(corners, columns * rows) if found else None
+
+
+def chessboard_size(grey: Bytes) -> tuple[int, int] | None:
+    """Squares across and down of whatever chessboard is in a picture, four each way at least."""
+    flags = cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_EXHAUSTIVE | cv2.CALIB_CB_LARGER
+    found, _, kinds = cv2.findChessboardCornersSBWithMeta(grey, (3, 3), flags)
+    return (int(kinds.shape[1]) + 1, int(kinds.shape[0]) + 1) if found else None
+
+
+def dot_grid(centres_px: Floats, columns: int, rows: int, asymmetric: bool) -> Floats | None:
+    """Dots (rows * columns, 2) that form a grid, among dots (n, 2); None when none do.
+
+    The first is one of the outer four, and rows may run either way.
+    """
+    if len(centres_px) < columns * rows:
+        return None
+    kind = cv2.CALIB_CB_ASYMMETRIC_GRID if asymmetric else cv2.CALIB_CB_SYMMETRIC_GRID
+    dots = np.ascontiguousarray(centres_px, dtype=np.float32).reshape(-1, 1, 2)
+    parameters = cv2.CirclesGridFinderParameters()
+    for flags in (kind, kind | cv2.CALIB_CB_CLUSTERING):
+        cv2.setRNGSeed(1)
+        try:
+            found, grid = cv2.findCirclesGrid(dots, (columns, rows), flags, None, parameters)
+        except cv2.error:
+            # OpenCV stops on dots that cannot form a grid at all, such as dots in one line.
+            continue
+        if found:
+            return _grid_of(grid, columns * rows)
+    return None
+
+
+def _grid_of(places: AnyImage, count: int) -> Floats | None:
+    points = np.asarray(places, dtype=np.float64).reshape(-1, 2)
+    return points if len(points) == count and np.isfinite(points).all() else None
 
 
 def plain_charuco(

@@ -9,6 +9,7 @@ import numpy as np
 from calibration.detection import opencv
 from calibration.detection.images import Picture
 from calibration.detection.opencv import Markers
+from calibration.targets.boards import AprilGrid
 from calibration.targets.kinds import CarrierKind, CharucoPlate, MarkerCarrier, marker_numbers
 
 _LARGE_PX = 3000
@@ -22,28 +23,35 @@ class MarkerSearch:
 
     def __init__(self, picture: Picture) -> None:
         self.picture = picture
-        self._seen: dict[str, Markers] = {}
+        self._seen: dict[tuple[str, int], Markers] = {}
 
-    def markers(self, dictionary: str, carriers: Sequence[CarrierKind]) -> Markers:
-        """Markers of a dictionary.
+    def markers(
+        self, dictionary: str, carriers: Sequence[CarrierKind], border_modules: int = 1
+    ) -> Markers:
+        """Markers of a dictionary with a black border so many modules wide.
 
         A large picture is searched made smaller, and searched again as it is when one of the
         ``carriers`` is missing in it, or shows markers so small that others may be missing.
         """
-        if dictionary not in self._seen:
-            self._seen[dictionary] = self._search(dictionary, carriers)
-        return self._seen[dictionary]
+        key = dictionary, border_modules
+        if key not in self._seen:
+            self._seen[key] = self._search(dictionary, carriers, border_modules)
+        return self._seen[key]
 
-    def _search(self, dictionary: str, carriers: Sequence[CarrierKind]) -> Markers:
+    def _search(
+        self, dictionary: str, carriers: Sequence[CarrierKind], border_modules: int
+    ) -> Markers:
         grey = self.picture.grey
         if max(grey.shape) < _LARGE_PX:
-            return opencv.detect_markers(grey, dictionary)
+            return opencv.detect_markers(grey, dictionary, border_modules=border_modules)
         factor = round(max(grey.shape) / _REDUCED_PX)
-        small = opencv.detect_markers(opencv.reduced(grey, factor), dictionary, refine=True)
+        small = opencv.detect_markers(
+            opencv.reduced(grey, factor), dictionary, True, border_modules
+        )
         found = Markers(small.ids, small.corners_px * factor + (factor - 1) / 2.0)
         if _complete(found, _SURE_SIDE_PX * factor, dictionary, carriers):
             return found
-        return opencv.detect_markers(grey, dictionary)
+        return opencv.detect_markers(grey, dictionary, border_modules=border_modules)
 
 
 def _complete(
@@ -54,7 +62,7 @@ def _complete(
     sides = np.linalg.norm(markers.corners_px - np.roll(markers.corners_px, 1, axis=1), axis=2)
     smallest = dict(zip(markers.ids.tolist(), sides.min(axis=1, initial=np.inf), strict=True))
     for carrier in carriers:
-        if not isinstance(carrier, CharucoPlate | MarkerCarrier):
+        if not isinstance(carrier, CharucoPlate | AprilGrid | MarkerCarrier):
             continue
         if carrier.dictionary != dictionary:
             continue

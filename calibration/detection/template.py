@@ -28,6 +28,8 @@ _STEPS = 20
 _ENOUGH_PX = 2e-4
 _SMALLEST_BLUR, _LARGEST_BLUR = 0.2, 8.0
 _SPREAD_SIGMA_PX = 0.5
+_HELD_MATRIX, _HELD_TILT = 1e-3, 2e-5
+"""0.05 px over 50 px between neighbours, and over the square of that (1/px)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,13 +104,18 @@ class Expected:
 
 
 def fit_template(
-    pattern: Pattern, window: Window, start: Floats, image_px: tuple[int, int]
+    pattern: Pattern,
+    window: Window,
+    start: Floats,
+    image_px: tuple[int, int],
+    held_map: bool = False,
 ) -> TemplateFit | None:
     """Fit ``pattern`` to a window from the map ``start``; None when the fit runs away.
 
     ``image_px`` is the size of the whole picture, from which a likely focal length follows.
+    ``held_map``: all of the map but its centre is known, as from the targets round about.
     """
-    prior_mean, prior_sigma = _prior(image_px)
+    prior_mean, prior_sigma = _held(start) if held_map else _prior(image_px)
     state = np.concatenate([start, [0.8 * window.pitch_px, 0.0, 1.0, 0.0, 0.0, 0.0]])
     values, pixels = window.values.ravel(), window.pixels
     fit = None
@@ -144,6 +151,17 @@ def _prior(image_px: tuple[int, int]) -> tuple[Floats, Floats]:
     sigma[localmap.BEND] = localmap.BEND_SIGMA
     sigma[SPREAD] = _SPREAD_SIGMA_PX
     return np.zeros(SIZE), sigma
+
+
+def _held(start: Floats) -> tuple[Floats, Floats]:
+    """A map known from neighbours some radii away, whose middles are out by 0.05 px at first."""
+    mean, sigma = np.zeros(SIZE), np.full(SIZE, np.inf)
+    mean[: localmap.SIZE] = start
+    sigma[localmap.MATRIX] = _HELD_MATRIX * float(np.abs(start[localmap.MATRIX]).max())
+    sigma[localmap.TILT] = _HELD_TILT
+    sigma[localmap.BEND] = 0.2 * localmap.BEND_SIGMA
+    sigma[SPREAD] = _SPREAD_SIGMA_PX
+    return mean, sigma
 
 
 def _sound(state: Floats) -> bool:

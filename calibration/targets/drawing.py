@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from calibration.targets.boardpatterns import board_pattern, tag_modules
+from calibration.targets.boards import AnyBoard, AprilGrid, Chessboard
 from calibration.targets.kinds import (
     DOT_CLEAR_MODULES,
     DOT_RADIUS_MODULES,
@@ -17,9 +19,7 @@ from calibration.targets.kinds import (
     RingCarrier,
 )
 from calibration.targets.patterns import (
-    ModulePattern,
-    PlatePattern,
-    RingPattern,
+    Pattern,
     marker_pattern,
     plate_pattern,
     ring_pattern,
@@ -79,6 +79,33 @@ def plate_areas(plate: CharucoPlate, corner_mm: Floats) -> Iterator[Area]:
     yield Area(tuple(polygons), not plate.inverted)
 
 
+def board_areas(board: AnyBoard, corner_mm: Floats) -> Iterator[Area]:
+    """A chessboard, AprilGrid or dot grid, the origin of its frame at ``corner_mm``."""
+    if board.inverted:
+        yield _backing(board_pattern(board), corner_mm)
+    if isinstance(board, Chessboard):
+        polygons = _runs(~board.white, board.square_mm, corner_mm)
+    elif isinstance(board, AprilGrid):
+        polygons = _tags(board, corner_mm)
+    else:
+        circle = _sector(board.dot_radius_mm, 0.0, 1.0)
+        polygons = [circle + place + corner_mm for place in board.grid_mm]
+    yield Area(tuple(polygons), not board.inverted)
+
+
+def _tags(grid: AprilGrid, corner_mm: Floats) -> list[Floats]:
+    polygons: list[Floats] = []
+    for number, (column, row) in enumerate(grid.places, grid.first_tag):
+        modules = tag_modules(grid, number)
+        place = corner_mm + np.array([column, row]) * grid.pitch_mm
+        polygons += _runs(~modules, grid.tag_mm / len(modules), place)
+    square = rectangle(-grid.gap_mm, -grid.gap_mm, 0.0, 0.0)
+    for row in range(grid.rows + 1):
+        for column in range(grid.columns + 1):
+            polygons.append(square + corner_mm + np.array([column, row]) * grid.pitch_mm)
+    return polygons
+
+
 def marker_areas(carrier: MarkerCarrier, number: int, middle_mm: Floats) -> Iterator[Area]:
     """One marker of a carrier about ``middle_mm``."""
     pattern = marker_pattern(carrier, number)
@@ -107,7 +134,7 @@ def ring_areas(carrier: RingCarrier, number: int, middle_mm: Floats) -> Iterator
     yield Area(tuple(p + middle_mm for p in polygons), not carrier.inverted)
 
 
-def _backing(pattern: PlatePattern | ModulePattern | RingPattern, place_mm: Floats) -> Area:
+def _backing(pattern: Pattern, place_mm: Floats) -> Area:
     """The black paper of a target that is white on black."""
     return Area((rectangle(*pattern.extent_mm) + place_mm,))
 

@@ -12,6 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from calibration.targets.boardpatterns import board_pattern
+from calibration.targets.boards import Board
 from calibration.targets.kinds import CarrierKind, CharucoPlate, MarkerCarrier
 from calibration.targets.patterns import Pattern, marker_pattern, plate_pattern, ring_pattern
 from common.errors import InputError
@@ -79,7 +81,7 @@ def _png(grey: NDArray[np.uint8], box_mm: float) -> bytes:
 
 def has_face(kind: CarrierKind) -> bool:
     """Whether a carrier is flat and its targets have places."""
-    if isinstance(kind, CharucoPlate):
+    if isinstance(kind, CharucoPlate | Board):
         return True
     places = np.array([p.position_mm for p in kind.places])
     return bool(np.isfinite(places).all() and np.ptp(places[:, 2]) <= FLAT_MM)
@@ -89,6 +91,8 @@ def _placed(kind: CarrierKind) -> list[tuple[Pattern, Floats]]:
     """Each pattern of a carrier with its place in the carrier's plane."""
     if isinstance(kind, CharucoPlate):
         return [(plate_pattern(kind), np.zeros(2))]
+    if isinstance(kind, Board):
+        return [(board_pattern(kind), np.zeros(2))]
     places = np.array([p.position_mm for p in kind.places])
     if isinstance(kind, MarkerCarrier):
         made: list[Pattern] = [marker_pattern(kind, p.number) for p in kind.places]

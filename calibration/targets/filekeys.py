@@ -52,6 +52,44 @@ class PlateModel(StrictModel):
     ruler: RulerModel | None = None
 
 
+class _BoardModel(StrictModel):
+    name: str
+    columns: int
+    rows: int
+    inverted: bool = False
+    fixed: bool = False
+    sigma_mm: Sigmas = (0.02, 0.02, 0.1)
+    ruler: RulerModel | None = None
+
+
+class ChessboardModel(_BoardModel):
+    """A plain chessboard: squares, not inner corners, each way."""
+
+    square_mm: float
+    upright: bool = False
+
+
+class AprilGridModel(_BoardModel):
+    """An AprilGrid as Kalibr prints it."""
+
+    tag_mm: float
+    gap_mm: float
+    dictionary: str = "DICT_APRILTAG_36H11"
+    first_tag: int = 0
+    from_top: bool = False
+    border_modules: Literal[1, 2] = 2
+    tag_turn_deg: Literal[0, 90, 180, 270] = 180
+
+
+class DotGridModel(_BoardModel):
+    """A symmetric or asymmetric grid of dots."""
+
+    spacing_mm: float
+    dot_radius_mm: float
+    asymmetric: bool = False
+    upright: bool = False
+
+
 class MarkersModel(StrictModel):
     """Square markers on a carrier."""
 
@@ -97,6 +135,9 @@ class TargetsModel(StrictModel):
     schema_: Literal["rigwright.targets/1"] = Field(alias="schema")
     name: str
     plates: list[PlateModel] = Field(default_factory=list)
+    chessboards: list[ChessboardModel] = Field(default_factory=list)
+    aprilgrids: list[AprilGridModel] = Field(default_factory=list)
+    dot_grids: list[DotGridModel] = Field(default_factory=list)
     markers: list[MarkersModel] = Field(default_factory=list)
     rings: list[RingsModel] = Field(default_factory=list)
     distances: list[DistanceModel] = Field(default_factory=list)

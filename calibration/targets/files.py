@@ -9,7 +9,11 @@ from typing import Any
 from pydantic import BaseModel
 
 from calibration.observations import Distance
+from calibration.targets.boards import AnyBoard, AprilGrid, Board, Chessboard, DotGrid
 from calibration.targets.filekeys import (
+    AprilGridModel,
+    ChessboardModel,
+    DotGridModel,
     MarkersModel,
     PlateModel,
     RingsModel,
@@ -23,12 +27,12 @@ from calibration.targets.kinds import (
     CharucoPlate,
     MarkerCarrier,
     RingCarrier,
-    Ruler,
     TargetPlace,
     TargetPlan,
     marker_numbers,
 )
 from calibration.targets.ringcodes import RingCodeFamily
+from calibration.targets.rulers import Ruler
 from common.errors import InputError
 from common.files import toml
 from common.files.strict import as_json
@@ -54,7 +58,10 @@ def targets_from(text: str, source: str = "the target file") -> TargetPlan:
 
 def targets_of(model: TargetsModel) -> TargetPlan:
     """The target set that a file's model describes. Raises :class:`InputError`."""
-    carriers: list[CarrierKind] = [_plate(m) for m in model.plates]
+    carriers: list[CarrierKind] = [CharucoPlate(**_with_ruler(m)) for m in model.plates]
+    carriers += [Chessboard(**_with_ruler(m)) for m in model.chessboards]
+    carriers += [AprilGrid(**_with_ruler(m)) for m in model.aprilgrids]
+    carriers += [DotGrid(**_with_ruler(m)) for m in model.dot_grids]
     carriers += [_markers(m) for m in model.markers]
     carriers += [_rings(m) for m in model.rings]
     distances = tuple(Distance(**m.model_dump()) for m in model.distances)
@@ -67,7 +74,7 @@ def targets_of(model: TargetsModel) -> TargetPlan:
 def targets_text(plan: TargetPlan) -> str:
     """A target set as a file's text; values that are as usual are left out.
 
-    A file has plates first, then markers, then ring targets, and is read in that order.
+    A file has plates and boards first, then markers, then ring targets, and is read in that order.
     """
     import tomlkit
 
@@ -76,7 +83,7 @@ def targets_text(plan: TargetPlan) -> str:
     document.add(tomlkit.comment("how large they came out: ruler = { drawn_mm, measured_mm }."))
     document["schema"] = SCHEMA
     document["name"] = plan.name
-    tables: dict[str, list[dict[str, Any]]] = {"plates": [], "markers": [], "rings": []}
+    tables: dict[str, list[dict[str, Any]]] = {key: [] for key in _TABLES}
     for carrier in plan.carriers:
         key, model = _model(carrier)
         tables[key].append(model.model_dump(exclude_defaults=True))
@@ -111,8 +118,12 @@ def _check_markers(carrier: CarrierKind) -> None:
 
 def _check_units(carrier: CarrierKind) -> None:
     """Sizes that no camera of a face rig could use are of another unit."""
-    if isinstance(carrier, CharucoPlate):
+    if isinstance(carrier, CharucoPlate | Chessboard):
         key, size, low, high = "square_mm", carrier.square_mm, 1.0, 300.0
+    elif isinstance(carrier, AprilGrid):
+        key, size, low, high = "tag_mm", carrier.tag_mm, 2.0, 1000.0
+    elif isinstance(carrier, DotGrid):
+        key, size, low, high = "spacing_mm", carrier.spacing_mm, 1.0, 300.0
     elif isinstance(carrier, MarkerCarrier):
         key, size, low, high = "size_mm", carrier.size_mm, 2.0, 1000.0
     else:
@@ -163,8 +174,13 @@ def _places(models: list[TargetPlaceModel]) -> tuple[TargetPlace, ...]:
     return tuple(out)
 
 
-def _plate(m: PlateModel) -> CharucoPlate:
-    return CharucoPlate(**{**m.model_dump(), "ruler": _ruler(m.ruler)})
+_TABLES = ("plates", "chessboards", "aprilgrids", "dot_grids", "markers", "rings")
+
+
+def _with_ruler(
+    m: PlateModel | ChessboardModel | AprilGridModel | DotGridModel,
+) -> dict[str, Any]:
+    return {**m.model_dump(), "ruler": _ruler(m.ruler)}
 
 
 def _markers(m: MarkersModel) -> MarkerCarrier:
@@ -184,12 +200,22 @@ def _model(carrier: CarrierKind) -> tuple[str, BaseModel]:
     values["ruler"] = None if ruler is None else vars(ruler)
     if isinstance(carrier, CharucoPlate):
         return "plates", PlateModel(**values)
+    if isinstance(carrier, Board):
+        return _board_model(carrier, values)
     values["targets"] = [_place(p) for p in values.pop("places")]
     if isinstance(carrier, MarkerCarrier):
         return "markers", MarkersModel(**values)
     family = values.pop("family")
     values |= {k: getattr(family, k) for k in _FAMILY if k != "code_distance"}
     return "rings", RingsModel(code_distance=family.distance, **values)
+
+
+def _board_model(board: AnyBoard, values: dict[str, Any]) -> tuple[str, BaseModel]:
+    if isinstance(board, Chessboard):
+        return "chessboards", ChessboardModel(**values)
+    if isinstance(board, AprilGrid):
+        return "aprilgrids", AprilGridModel(**values)
+    return "dot_grids", DotGridModel(**values)
 
 
 def _place(place: TargetPlace) -> dict[str, Any]:

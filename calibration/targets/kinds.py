@@ -11,8 +11,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from calibration.observations import Carrier, Distance, TargetSet
+from calibration.targets.boards import MOST_SQUARES, AprilGrid, Chessboard, DotGrid
 from calibration.targets.ringcodes import RingCodeFamily
-from common.errors import InputError
+from calibration.targets.rulers import Ruler, require
 from geometry.arrays import Floats
 
 UNKNOWN_MM = (float("nan"),) * 3
@@ -22,43 +23,6 @@ RING_INNER, RING_OUTER, RING_QUIET = 2.0, 3.0, 4.0
 DOT_RADIUS_MODULES, DOT_CLEAR_MODULES = 0.28, 0.44
 """The dot in a marker's middle and the disc that clears it, in modules: small enough that the
 four modules it touches still read right."""
-
-
-def _require(condition: bool, detail: str, problem: str, remedy: str) -> None:
-    if not condition:
-        raise InputError(detail, problem, remedy)
-
-
-@dataclass(frozen=True)
-class Ruler:
-    """The check ruler of a printed sheet: its length as drawn and as measured on paper."""
-
-    drawn_mm: float
-    measured_mm: float
-    sigma_mm: float = 0.1
-
-    def __post_init__(self) -> None:
-        good = np.isfinite([self.drawn_mm, self.measured_mm, self.sigma_mm]).all()
-        _require(
-            bool(good) and min(self.drawn_mm, self.measured_mm, self.sigma_mm) > 0.0,
-            "ruler",
-            f"a ruler of {self.drawn_mm:g} mm measured as {self.measured_mm:g} mm cannot be",
-            "give positive lengths in millimetres",
-        )
-        _require(
-            0.5 < self.scale < 2.0,
-            "ruler-units",
-            f"a ruler drawn {self.drawn_mm:g} mm long cannot have come out {self.measured_mm:g} mm",
-            "measure in millimetres, or print again without scaling",
-        )
-
-    @property
-    def scale(self) -> float:
-        """What to multiply drawn lengths by."""
-        return self.measured_mm / self.drawn_mm
-
-
-MOST_SQUARES = 100
 
 
 @dataclass(frozen=True)
@@ -85,25 +49,26 @@ class CharucoPlate:
     ruler: Ruler | None = None
 
     def __post_init__(self) -> None:
-        _require(
+        require(
             min(self.columns, self.rows) >= 3 and max(self.columns, self.rows) <= MOST_SQUARES,
             "plate-squares",
             f"plate {self.name!r} has {self.columns} x {self.rows} squares",
             f"give 3 to {MOST_SQUARES} squares each way",
         )
-        _require(
+        require(
             np.isfinite(self.square_mm) and 0.0 < self.marker_mm < self.square_mm,
             "plate-size",
             f"plate {self.name!r} has markers of {self.marker_mm:g} mm in squares of "
             f"{self.square_mm:g} mm",
             "give millimetres, markers smaller than squares",
         )
-        _require(
+        require(
             self.first_marker >= 0,
             "plate-markers",
             f"plate {self.name!r} begins with marker {self.first_marker}",
             "begin with 0 or more",
         )
+        object.__setattr__(self, "dictionary", self.dictionary.upper())
 
     @property
     def scale(self) -> float:
@@ -181,12 +146,13 @@ class MarkerCarrier:
 
     def __post_init__(self) -> None:
         _check_places(self.name, self.places)
-        _require(
+        require(
             np.isfinite(self.size_mm) and self.size_mm > 0.0 and not (self.dot and self.corners),
             "markers",
             f"markers {self.name!r} have no size, or both dots and corners as targets",
             "give size_mm in millimetres, and dots or corners",
         )
+        object.__setattr__(self, "dictionary", self.dictionary.upper())
 
     @property
     def scale(self) -> float:
@@ -235,7 +201,7 @@ class RingCarrier:
 
     def __post_init__(self) -> None:
         _check_places(self.name, self.places)
-        _require(
+        require(
             np.isfinite(self.dot_radius_mm) and self.dot_radius_mm > 0.0,
             "rings",
             f"the ring targets of {self.name!r} have dots of radius {self.dot_radius_mm:g} mm",
@@ -244,7 +210,7 @@ class RingCarrier:
         for place in self.places:
             self.family.word(place.number)
         line = np.array([p.position_mm for p in self.places])
-        _require(
+        require(
             not self.bar or (len(line) >= 2 and bool(np.isfinite(line).all())),
             "bar",
             f"the scale bar {self.name!r} has fewer than two targets, or one without a place",
@@ -270,12 +236,12 @@ class RingCarrier:
         return Carrier(self.name, self.ids, *_nominal(self.places, self.scale), self.fixed)
 
 
-CarrierKind = CharucoPlate | MarkerCarrier | RingCarrier
+CarrierKind = CharucoPlate | Chessboard | AprilGrid | DotGrid | MarkerCarrier | RingCarrier
 
 
 def _check_places(name: str, places: tuple[TargetPlace, ...]) -> None:
     numbers = [p.number for p in places]
-    _require(
+    require(
         len(numbers) > 0 and len(set(numbers)) == len(numbers) and min(numbers) >= 0,
         "carrier-numbers",
         f"carrier {name!r} has no targets, or two of one number",
@@ -297,7 +263,7 @@ class TargetPlan:
 
     def __post_init__(self) -> None:
         names = [c.name for c in self.carriers]
-        _require(
+        require(
             len(set(names)) == len(names),
             "carrier-names",
             f"two carriers of target set {self.name!r} have one name",
@@ -307,7 +273,7 @@ class TargetPlan:
         for carrier in self.carriers:
             if isinstance(carrier, RingCarrier):
                 other = families.setdefault(carrier.family.bits, carrier.family)
-                _require(
+                require(
                     other == carrier.family,
                     "ring-families",
                     f"carrier {carrier.name!r} uses another family of {other.bits}-bit codes",
@@ -321,7 +287,7 @@ class TargetPlan:
         for carrier in self.carriers:
             mine = marker_numbers(carrier)
             clash = used & mine
-            _require(
+            require(
                 not clash,
                 "marker-clash",
                 f"carrier {carrier.name!r} shows marker {min(clash, default=('', 0))[1]} of "
@@ -341,6 +307,9 @@ def marker_numbers(carrier: CarrierKind) -> set[tuple[str, int]]:
     if isinstance(carrier, CharucoPlate):
         first, count = carrier.first_marker, len(carrier.marker_squares)
         return {(carrier.dictionary, first + k) for k in range(count)}
+    if isinstance(carrier, AprilGrid):
+        numbers = range(carrier.first_tag, carrier.first_tag + carrier.columns * carrier.rows)
+        return {(carrier.dictionary, number) for number in numbers}
     if isinstance(carrier, MarkerCarrier):
         return {(carrier.dictionary, p.number) for p in carrier.places}
     return set()

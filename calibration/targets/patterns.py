@@ -85,7 +85,7 @@ class ModulePattern:
     @property
     def outline_mm(self) -> Floats:
         """Corners of the border."""
-        return _corners(self.extent_mm)
+        return corners_of(self.extent_mm)
 
     @property
     def finest_mm(self) -> float:
@@ -94,7 +94,7 @@ class ModulePattern:
 
     def within_mm(self, x_mm: Floats, y_mm: Floats) -> Floats:
         """Distance to the nearest edge of the border."""
-        return _within(self.extent_mm, x_mm, y_mm)
+        return within_box(self.extent_mm, x_mm, y_mm)
 
     @property
     def middle_mm(self) -> tuple[float, float]:
@@ -106,8 +106,10 @@ class ModulePattern:
     def white_share(self, x_mm: Floats, y_mm: Floats, box_mm: tuple[float, float]) -> Floats:
         """Share of white in boxes about the places."""
         padded = np.pad(self.white, 1, constant_values=True).astype(np.float64)
-        columns = _split((x_mm - self.origin_mm[0]) / self.module_mm, box_mm[0] / self.module_mm)
-        rows = _split((y_mm - self.origin_mm[1]) / self.module_mm, box_mm[1] / self.module_mm)
+        columns = split_cells(
+            (x_mm - self.origin_mm[0]) / self.module_mm, box_mm[0] / self.module_mm
+        )
+        rows = split_cells((y_mm - self.origin_mm[1]) / self.module_mm, box_mm[1] / self.module_mm)
         share = np.zeros(np.shape(x_mm))
         for row, row_part in rows:
             row = np.clip(row + 1, 0, padded.shape[0] - 1)
@@ -117,9 +119,9 @@ class ModulePattern:
         if self.dot:
             middle = self.middle_mm
             away, box = _polar(x_mm - middle[0], y_mm - middle[1], box_mm)
-            clear = _inside(DOT_CLEAR_MODULES * self.module_mm - away, box)
+            clear = inside_share(DOT_CLEAR_MODULES * self.module_mm - away, box)
             share += clear * (1.0 - share)
-            share *= 1.0 - _inside(DOT_RADIUS_MODULES * self.module_mm - away, box)
+            share *= 1.0 - inside_share(DOT_RADIUS_MODULES * self.module_mm - away, box)
         return 1.0 - share if self.inverted else share
 
 
@@ -161,13 +163,15 @@ class RingPattern:
         """Share of white in boxes about the places."""
         away, box = _polar(x_mm, y_mm, box_mm)
         radius = self.dot_radius_mm
-        black = _inside(radius - away, box)
-        band = _inside(RING_OUTER * radius - away, box) - _inside(RING_INNER * radius - away, box)
+        black = inside_share(radius - away, box)
+        band = inside_share(RING_OUTER * radius - away, box) - inside_share(
+            RING_INNER * radius - away, box
+        )
         turn = (np.arctan2(y_mm, x_mm) / (2.0 * np.pi) * self.bits) % self.bits
         sector_mm = 2.0 * np.pi / self.bits * np.maximum(away, radius)
         code = np.zeros(np.shape(x_mm))
         table = np.array([(self.word >> k) & 1 for k in range(self.bits)], dtype=np.float64)
-        for sector, part in _split(turn, np.minimum(box / sector_mm, 0.5)):
+        for sector, part in split_cells(turn, np.minimum(box / sector_mm, 0.5)):
             code += table[sector % self.bits] * part
         black += band * code
         return black if self.inverted else 1.0 - black
@@ -179,32 +183,34 @@ def _polar(x_mm: Floats, y_mm: Floats, box_mm: tuple[float, float]) -> tuple[Flo
     return away, np.maximum(np.hypot(x_mm * box_mm[0], y_mm * box_mm[1]) / away, min(box_mm))
 
 
-def _corners(extent_mm: tuple[float, float, float, float]) -> Floats:
+def corners_of(extent_mm: tuple[float, float, float, float]) -> Floats:
+    """Corners (4, 2) of left, top, right, bottom, clockwise."""
     left, top, right, bottom = extent_mm
     return np.array([[left, top], [right, top], [right, bottom], [left, bottom]])
 
 
-def _within(extent_mm: tuple[float, float, float, float], x_mm: Floats, y_mm: Floats) -> Floats:
+def within_box(extent_mm: tuple[float, float, float, float], x_mm: Floats, y_mm: Floats) -> Floats:
+    """How far inside left, top, right, bottom places are, negative outside."""
     left, top, right, bottom = extent_mm
     across, down = np.minimum(x_mm - left, right - x_mm), np.minimum(y_mm - top, bottom - y_mm)
     return np.minimum(across, down)
 
 
-def _inside(depth: Floats, box: float | Floats) -> Floats:
-    """Share of a soft box inside an edge ``depth`` away (positive: inside).
+def inside_share(within: Floats, box: float | Floats) -> Floats:
+    """Share of a soft box inside an edge ``within`` away (positive: inside).
 
     Soft: a hat of twice the box's width. Hats at the box's pitch add up to one and keep the
     place of an edge exactly; boxes let it wander with the edge's slope.
     """
-    t = np.clip(depth / box, -1.0, 1.0)
+    t = np.clip(within / box, -1.0, 1.0)
     return np.asarray(0.5 + t - 0.5 * t * np.abs(t))
 
 
-def _split(place: Floats, box: float | Floats) -> list[tuple[Ints, Floats]]:
+def split_cells(place: Floats, box: float | Floats) -> list[tuple[Ints, Floats]]:
     """The two cells of unit length nearest to each place, and the soft box's share in each."""
     border = np.rint(place)
     low = border.astype(np.int64) - 1
-    upper = _inside(place - border, box)
+    upper = inside_share(place - border, box)
     return [(low, 1.0 - upper), (low + 1, upper)]
 
 
@@ -225,7 +231,7 @@ class PlatePattern:
     @property
     def outline_mm(self) -> Floats:
         """Corners of the border."""
-        return _corners(self.extent_mm)
+        return corners_of(self.extent_mm)
 
     @property
     def finest_mm(self) -> float:
@@ -235,7 +241,7 @@ class PlatePattern:
 
     def within_mm(self, x_mm: Floats, y_mm: Floats) -> Floats:
         """Distance to the nearest edge of the border."""
-        return _within(self.extent_mm, x_mm, y_mm)
+        return within_box(self.extent_mm, x_mm, y_mm)
 
     @property
     def _modules_per_marker(self) -> int:
@@ -268,8 +274,8 @@ class PlatePattern:
         size = self._modules_per_marker
         module_mm = self.plate.marker_mm / size
         black = np.zeros(len(x))
-        for i, i_part in _split(y / module_mm, box[1] / module_mm):
-            for j, j_part in _split(x / module_mm, box[0] / module_mm):
+        for i, i_part in split_cells(y / module_mm, box[1] / module_mm):
+            for j, j_part in split_cells(x / module_mm, box[0] / module_mm):
                 on = (i >= 0) & (i < size) & (j >= 0) & (j < size)
                 at_row = row.astype(np.int64) * size + np.clip(i, 0, size - 1)
                 at_column = column.astype(np.int64) * size + np.clip(j, 0, size - 1)

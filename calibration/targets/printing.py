@@ -9,10 +9,13 @@ from xml.sax.saxutils import escape
 
 import numpy as np
 
+from calibration.targets.boardpatterns import board_pattern
+from calibration.targets.boards import Board
 from calibration.targets.drawing import (
     Area,
     Drawing,
     Label,
+    board_areas,
     marker_areas,
     plate_areas,
     rectangle,
@@ -68,6 +71,12 @@ def carrier_drawings(kind: CarrierKind, page: str = "A4") -> tuple[Drawing, ...]
     fit.
     """
     width, height = page_size(page)
+    if isinstance(kind, Board):
+        left, top, right, bottom = board_pattern(kind).extent_mm
+        offset = _centred(
+            kind.name, np.array([left, top]), np.array([right, bottom]), width, height
+        )
+        return (_page(kind, width, height, list(board_areas(kind, offset)), []),)
     if isinstance(kind, CharucoPlate):
         border = kind.square_mm / 4.0
         low = np.full(2, -border)

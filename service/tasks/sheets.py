@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from calibration.targets.boards import Board
 from calibration.targets.drawing import Drawing
 from calibration.targets.faces import carrier_face, has_face
 from calibration.targets.kinds import (
@@ -79,7 +80,7 @@ def _drawn(carrier: CarrierKind, page: str) -> tuple[Drawing, ...]:
 
 def _laid_out(carrier: CarrierKind) -> CarrierKind:
     """A stand's targets one beside the other: they are cut out and put up at their places."""
-    if isinstance(carrier, CharucoPlate) or not _stands(carrier):
+    if isinstance(carrier, CharucoPlate | Board) or not _stands(carrier):
         return carrier
     return replace(carrier, places=tuple(TargetPlace(place.number) for place in carrier.places))
 
@@ -91,7 +92,7 @@ def _stands(carrier: MarkerCarrier | RingCarrier) -> bool:
 
 def _placed(carrier: CarrierKind) -> list[Sheet]:
     """Where the targets of a stand go, as a table."""
-    if isinstance(carrier, CharucoPlate) or not _stands(carrier):
+    if isinstance(carrier, CharucoPlate | Board) or not _stands(carrier):
         return []
     rows = [(place.number, *(f"{v:.1f}" for v in place.position_mm)) for place in carrier.places]
     text = io.StringIO()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from calibration.targets.boards import AprilGrid, Chessboard, DotGrid
 from calibration.targets.files import read_targets, write_targets
 from calibration.targets.kinds import CharucoPlate, MarkerCarrier, RingCarrier, TargetPlan
 from common.errors import CancelledError
@@ -37,6 +38,9 @@ def targets(task: Task[TargetsRequest, TargetsResult], running: Running) -> Targ
 
 _KINDS = {
     CharucoPlate: "ChArUco plate",
+    Chessboard: "chessboard",
+    AprilGrid: "AprilGrid",
+    DotGrid: "dot grid",
     MarkerCarrier: "square markers",
     RingCarrier: "ring-coded targets",
 }

@@ -14,11 +14,11 @@ from calibration.targets.kinds import (
     CharucoPlate,
     MarkerCarrier,
     RingCarrier,
-    Ruler,
     TargetPlace,
     TargetPlan,
 )
 from calibration.targets.ringcodes import RingCodeFamily
+from calibration.targets.rulers import Ruler
 from calibration.targets.sheets import marker_sheet, ring_sheet, scale_bar
 from common.errors import ConflictError, InputError
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from calibration.detection.finding import find_targets
+from calibration.targets.boards import AprilGrid, Chessboard, DotGrid
 from calibration.targets.kinds import (
     CarrierKind,
     CharucoPlate,
@@ -29,6 +30,15 @@ SHEETS: tuple[tuple[CarrierKind, str, int], ...] = (
     (marker_sheet("markers", "DICT_4X4_50", range(6), 30.0, 3), "A4", 60),
     (ring_sheet("rings", range(1, 9), 3.0), "160x120", 110),
     (scale_bar("bar", (1, 2, 3), (150.0, 300.0), 4.0, 14)[0], "400x80", 120),
+    (Chessboard(name="chess", columns=5, rows=4, square_mm=20.0), "140x140", 80),
+    (AprilGrid(name="grid", columns=3, rows=2, tag_mm=30.0, gap_mm=9.0), "160x140", 80),
+    (
+        DotGrid(
+            name="dots", columns=3, rows=5, spacing_mm=14.0, dot_radius_mm=4.0, asymmetric=True
+        ),
+        "140x140",
+        80,
+    ),
 )
 
 

@@ -17,7 +17,8 @@ def test_the_page_lists_the_rules_as_they_are() -> None:
 
 
 def test_the_example_can_be_read() -> None:
-    (example,) = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
+    example, boards = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
     plan = targets_from(example)
     assert [c.name for c in plan.carriers] == ["plate", "stand", "bar"]
     assert plan.distances[0].length_mm == 200.03
+    assert [c.name for c in targets_from(boards).carriers] == ["chess", "kalibr", "dots"]

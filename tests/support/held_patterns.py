@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from calibration.targets.boardpatterns import board_pattern
+from calibration.targets.boards import Board
 from calibration.targets.kinds import CarrierKind, CharucoPlate, MarkerCarrier
 from calibration.targets.patterns import marker_pattern, plate_pattern, ring_pattern
 from calibration.targets.rendering import PlacedPattern
@@ -21,6 +23,8 @@ def placed_carrier(
     rotation, translation = np.asarray(rotation_to_camera), np.asarray(translation_mm)
     if isinstance(kind, CharucoPlate):
         return (PlacedPattern(plate_pattern(kind), rotation, translation),)
+    if isinstance(kind, Board):
+        return (PlacedPattern(board_pattern(kind), rotation, translation),)
     patterns = (
         marker_pattern(kind, p.number)
         if isinstance(kind, MarkerCarrier)
