@@ -28,7 +28,8 @@ class Carrier:
 
     ``ids`` (m,) names its targets, unique within a target set. ``nominal_mm`` (m, 3) where they
     are in the carrier's own frame; ``sigma_mm`` (m, 3) how well that is known: 0 is exact,
-    infinite is not at all (then the nominal value is only a start, and may be NaN).
+    infinite is not at all (then the nominal value is only a start, and may be NaN). ``two_sided``:
+    it shows targets to either side, so cameras may see it from behind.
     """
 
     name: str
@@ -36,6 +37,7 @@ class Carrier:
     nominal_mm: Floats
     sigma_mm: Floats
     fixed: bool = False
+    two_sided: bool = False
 
     def __post_init__(self) -> None:
         shape = (len(self.ids), 3)

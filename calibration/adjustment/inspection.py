@@ -60,8 +60,9 @@ def _one_side(observations: Observations) -> None:
     votes = np.zeros((len(observations.targets.carriers), len(observations.cameras)))
     placements = Placements.of(observations)
     for view in views_of(observations, placements):
-        side = _side(view, observations, nominal)
-        votes[int(placements.carrier[view.place]), view.camera] += side
+        carrier = int(placements.carrier[view.place])
+        if not observations.targets.carriers[carrier].two_sided:
+            votes[carrier, view.camera] += _side(view, observations, nominal)
     sides = np.sign(votes)
     for row in sides:
         seen = row != 0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -27,6 +27,7 @@ from calibration.detection.rings import mirrored_codes, ring_dots
 from calibration.detection.seeing import MarkerSearch
 from calibration.targets.boards import MOST_SQUARES, AprilGrid, Chessboard
 from calibration.targets.kinds import (
+    CarrierKind,
     CharucoPlate,
     MarkerCarrier,
     RingCarrier,
@@ -36,6 +37,7 @@ from calibration.targets.kinds import (
 
 _ENOUGH_MARKERS = 4
 _MOST_COLUMNS = 30
+_BACK = "; or, where it is the back of a plate, give back_mm, the plate's thickness"
 _SIZE_SHARE, _SIZE_PX = 0.05, 3.0
 FEW = 8
 """Some codes look the same in a mirror: a few targets can be found in a mirrored picture."""
@@ -177,10 +179,12 @@ def _mirrored(
     sights: Mapping[bool, MarkerSearch], plan: TargetPlan, gates: Gates, found: int
 ) -> PictureProblem | None:
     rings = [c for c in plan.carriers if isinstance(c, RingCarrier)]
+    # The back of a plate that has one is meant to be seen in a mirror.
+    one_sided = [c for c in plan.carriers if not isinstance(c, CharucoPlate) or c.back_mm is None]
     count = 0
     for inverted, sight in sights.items():
         side = sight.picture
-        count += _known_markers(side.mirrored, plan, inverted)
+        count += _known_markers(side.mirrored, one_sided, inverted)
         mine = [c for c in rings if c.inverted == inverted]
         count += mirrored_codes(side, ring_dots(side, gates), mine) if mine else 0
     if count < max(2.0, 0.5 * found):
@@ -188,7 +192,8 @@ def _mirrored(
     return PictureProblem(
         "mirrored",
         f"the picture is mirrored: {count} targets can be read in a mirror only",
-        "switch off mirroring or flipping in the camera or its viewer, and take it again",
+        "switch off mirroring or flipping in the camera or its viewer, and take it again"
+        + (_BACK if any(isinstance(c, CharucoPlate) for c in one_sided) else ""),
     )
 
 
@@ -198,7 +203,7 @@ def _inverted(
     del gates, found
     for inverted, sight in sights.items():
         side = sight.picture.negative
-        if _known_markers(side, plan, inverted) >= 2:
+        if _known_markers(side, plan.carriers, inverted) >= 2:
             return PictureProblem(
                 "inverted",
                 "the targets are printed with black and white exchanged",
@@ -207,11 +212,11 @@ def _inverted(
     return None
 
 
-def _known_markers(picture: Picture, plan: TargetPlan, inverted: bool) -> int:
+def _known_markers(picture: Picture, carriers: Sequence[CarrierKind], inverted: bool) -> int:
     count = 0
     wanted = {
         (dictionary, c.border_modules if isinstance(c, AprilGrid) else 1, number)
-        for c in plan.carriers
+        for c in carriers
         if c.inverted == inverted
         for dictionary, number in marker_numbers(c)
     }

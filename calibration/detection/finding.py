@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -96,11 +97,30 @@ def _square_targets(
         for carrier in mine:
             if isinstance(carrier, CharucoPlate):
                 found = plate_points(sight.picture, carrier, markers, gates)
+                if carrier.back_mm is not None and not found[0]:
+                    found = _back_points(sight.picture, carrier, gates)
             else:
                 found = marker_points(sight.picture, carrier, markers, gates)
             points += found[0]
             rejections += found[1]
     return points, rejections
+
+
+def _back_points(
+    picture: Picture, plate: CharucoPlate, gates: Gates
+) -> tuple[list[Point], list[Rejection]]:
+    """Corners on a plate's back: those of its front in a mirror."""
+    sight = MarkerSearch(picture.mirrored)
+    markers, _ = once(sight.markers(plate.dictionary, (plate,)))
+    points, rejections = plate_points(sight.picture, plate, markers, gates)
+    far = picture.size_px[0] - 1.0
+    back = dict(zip(plate.front_ids, plate.back_ids, strict=True))
+    return [
+        replace(p, target=back[p.target], pixel=(far - p.pixel[0], p.pixel[1])) for p in points
+    ], [
+        replace(r, target=back.get(r.target, r.target), pixel=(far - r.pixel[0], r.pixel[1]))
+        for r in rejections
+    ]
 
 
 def once(markers: Markers) -> tuple[Markers, list[Rejection]]:

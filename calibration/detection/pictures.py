@@ -10,10 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
-from calibration.detection.detections import Detections
+from calibration.detection.detections import Detections, PictureProblem
 from calibration.detection.diagnosis import FEW
 from calibration.detection.finding import find_targets
-from calibration.detection.gates import Gates
+from calibration.detection.gates import Gates, Rule
 from calibration.detection.images import read_picture
 from calibration.detection.opencv import AnyImage
 from calibration.detection.selftest import require_opencv
@@ -24,6 +24,15 @@ from common.progress import CancelToken, NeverCancelled, Progress, ProgressCallb
 
 _POLL_S = 0.1
 _EXPLAINED = 3
+_LEAST_STRAIGHT = 2
+_MISPLACED = (Rule.FIT, Rule.HOMOGRAPHY, Rule.POSE)
+_MANY = 0.2
+"""Share of targets: of ten pictures of real plates in webcams at most a twentieth is lost so."""
+_MIRRORED = (
+    "{camera} sees the targets in a mirror only and was left out: it looks at the back of a plate "
+    "(then give back_mm, the plate's thickness, in the target file), or its pictures are flipped "
+    "(then switch that off and take them again)."
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,18 +54,40 @@ class TakenPicture:
 
 @dataclass(frozen=True, eq=False)
 class DetectedPictures:
-    """What was found: ``detections`` belong to ``pictures``, one each, in order."""
+    """What was found: ``detections`` belong to ``pictures``, one each, in order.
+
+    ``left_out``: a sentence for each camera that is not among the observations.
+    """
 
     observations: Observations
     pictures: tuple[TakenPicture, ...]
     detections: tuple[Detections, ...]
+    left_out: tuple[str, ...] = ()
 
     def counts(self) -> dict[str, int]:
         """Targets found by each camera in all its pictures."""
-        total = dict.fromkeys(self.observations.cameras, 0)
+        total = dict.fromkeys((picture.camera for picture in self.pictures), 0)
         for picture, found in zip(self.pictures, self.detections, strict=True):
             total[picture.camera] += len(found)
         return total
+
+    def thrown_out(self) -> tuple[str, ...]:
+        """A sentence for each camera of whose targets many do not lie where they should."""
+        lost: Counter[str] = Counter()
+        for picture, found in zip(self.pictures, self.detections, strict=True):
+            lost[picture.camera] += sum(r.rule in _MISPLACED for r in found.rejections)
+        shares = {
+            camera: lost[camera] / (lost[camera] + count)
+            for camera, count in self.counts().items()
+            if lost[camera]
+        }
+        return tuple(
+            f"{share:.0%} of the targets that {camera} saw were not used, because they do not lie "
+            "or look as described: check the target file against the targets, and whether they are "
+            "flat."
+            for camera, share in shares.items()
+            if share > _MANY
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,11 +120,15 @@ def detect_pictures(
     progress: ProgressCallback = ignore_progress,
     cancel: CancelToken | None = None,
     executor: Executor | None = None,
+    leave_mirrored: bool = False,
 ) -> DetectedPictures:
     """Targets in all pictures. Cameras and frames keep the order in which they first come.
 
     Work goes to ``executor`` when there is one (jobs and results can be pickled), else it is
-    done here. Raises :class:`CancelledError`, and one-line :class:`InputError` for: no pictures,
+    done here. ``leave_mirrored``: a camera that sees the targets in a mirror only is left out, as
+    long as two others see them as they are.
+
+    Raises :class:`CancelledError`, and one-line :class:`InputError` for: no pictures,
     two of one camera and frame, a picture that cannot be read, pictures of one camera in
     different sizes, and a camera that saw no target at all, with the reason where it is known.
     Raises :class:`DeviceError` when this OpenCV measures wrongly.
@@ -107,9 +142,15 @@ def detect_pictures(
         _check_size(pictures, found, result)
         found.append(result)
         progress(Progress("detection", number / len(jobs), iteration=number))
-    _check_seen(jobs, found)
-    observations = _observations(pictures, found, plan)
-    return DetectedPictures(observations, tuple(pictures), tuple(found))
+    mirrored = _check_seen(jobs, found)
+    straight = len({p.camera for p in pictures}) - len(mirrored)
+    if mirrored and not (leave_mirrored and straight >= _LEAST_STRAIGHT):
+        camera, finding = next(iter(mirrored.items()))
+        raise finding.error(f"camera {camera}")
+    rows = [k for k, picture in enumerate(pictures) if picture.camera not in mirrored]
+    observations = _observations([pictures[k] for k in rows], [found[k] for k in rows], plan)
+    left_out = tuple(_MIRRORED.format(camera=camera) for camera in mirrored)
+    return DetectedPictures(observations, tuple(pictures), tuple(found), left_out)
 
 
 def _results(
@@ -171,20 +212,33 @@ def _text(found: Detections) -> str:
     return "{} x {}".format(*found.image_size_px)
 
 
-def _check_seen(jobs: Sequence[DetectionJob], found: Sequence[Detections]) -> None:
-    """Every camera must have seen something; the one that has not is asked why."""
+def _check_seen(
+    jobs: Sequence[DetectionJob], found: Sequence[Detections]
+) -> dict[str, PictureProblem]:
+    """Every camera must have seen something; the one that has not is asked why.
+
+    Returns the cameras that see everything in a mirror.
+    """
+    mirrored: dict[str, PictureProblem] = {}
     cameras = dict.fromkeys(job.picture.camera for job in jobs)
     for camera in cameras:
         mine = [k for k, job in enumerate(jobs) if job.picture.camera == camera]
         best = max(mine, key=lambda k: len(found[k]))
         if len(found[best]):
-            _check_mirrored(jobs[best], len(found[best]))
+            finding = _mirrored(jobs[best], len(found[best]))
+            if finding is not None:
+                mirrored[camera] = finding
             continue
         # A picture with rejections shows more than one without, and explains better.
         for k in sorted(mine, key=lambda k: -len(found[k].rejections))[:_EXPLAINED]:
             explained = replace(jobs[k], explain=True)()
+            if explained.findings and explained.findings[0].code == "mirrored":
+                mirrored[camera] = explained.findings[0]
+                break
             if explained.findings:
                 raise explained.findings[0].error(f"camera {camera}")
+        if camera in mirrored:
+            continue
         rejected = Counter(r.rule.value for k in mine for r in found[k].rejections)
         seen = ""
         if rejected:
@@ -197,15 +251,15 @@ def _check_seen(jobs: Sequence[DetectionJob], found: Sequence[Detections]) -> No
             "check that the targets are in view, sharp and well lit, and that the target file "
             "is theirs",
         )
+    return mirrored
 
 
-def _check_mirrored(job: DetectionJob, found: int) -> None:
+def _mirrored(job: DetectionJob, found: int) -> PictureProblem | None:
     """Few targets in a camera's best picture may be those that look the same in a mirror."""
     if found > min(FEW, len(job.plan.target_set().ids) // 2):
-        return
-    for finding in replace(job, explain=True)().findings:
-        if finding.code == "mirrored":
-            raise finding.error(f"camera {job.picture.camera}")
+        return None
+    findings = replace(job, explain=True)().findings
+    return next((finding for finding in findings if finding.code == "mirrored"), None)
 
 
 def _observations(

@@ -39,7 +39,7 @@ def _crossings(plate: CharucoPlate) -> Crossings:
     corners = zip(columns.ravel().tolist(), rows.ravel().tolist(), strict=True)
     turned = np.array([not plate.is_white(column, row) for column, row in corners])
     margin = (1.0 - plate.marker_mm / plate.square_mm) / 2.0
-    return Crossings(plate.ids, plate.corner_grid_mm, turned, margin)
+    return Crossings(plate.front_ids, plate.corner_grid_mm, turned, margin)
 
 
 def plane_markers(plate: CharucoPlate, markers: Markers) -> tuple[Markers, Floats]:

@@ -50,6 +50,7 @@ class PlateModel(StrictModel):
     fixed: bool = False
     sigma_mm: Sigmas = (0.02, 0.02, 0.1)
     ruler: RulerModel | None = None
+    back_mm: float | None = None
 
 
 class _BoardModel(StrictModel):

@@ -25,6 +25,9 @@ DOT_RADIUS_MODULES, DOT_CLEAR_MODULES = 0.28, 0.44
 four modules it touches still read right."""
 
 
+MOST_BACK_MM = 50.0
+
+
 @dataclass(frozen=True)
 class CharucoPlate:
     """A ChArUco plate: ``columns`` x ``rows`` squares, markers in the white ones.
@@ -32,7 +35,9 @@ class CharucoPlate:
     ``legacy``: the pattern of OpenCV before 4.6, which begins with a white square when the rows
     are even in number. ``inverted``: black and white exchanged. Its targets are the inner
     corners, numbered row by row as OpenCV does, in a frame with x right, y down, z into the
-    plate, origin in the outer corner of the first square. ``sigma_mm`` (x, y, z).
+    plate, origin in the outer corner of the first square. ``sigma_mm`` (x, y, z). ``back_mm``: the
+    thickness of a plate that shows the same corners on its back, in a mirror, as prints on film
+    do; they are targets of their own, numbered alike.
     """
 
     name: str
@@ -47,8 +52,15 @@ class CharucoPlate:
     fixed: bool = False
     sigma_mm: tuple[float, float, float] = (0.02, 0.02, 0.1)
     ruler: Ruler | None = None
+    back_mm: float | None = None
 
     def __post_init__(self) -> None:
+        require(
+            self.back_mm is None or 0.0 <= self.back_mm <= MOST_BACK_MM,
+            "plate-back",
+            f"plate {self.name!r} is {self.back_mm} mm thick",
+            f"give back_mm, from its front to its back, as 0 to {MOST_BACK_MM:g} mm",
+        )
         require(
             min(self.columns, self.rows) >= 3 and max(self.columns, self.rows) <= MOST_SQUARES,
             "plate-squares",
@@ -101,15 +113,28 @@ class CharucoPlate:
     @property
     def ids(self) -> tuple[str, ...]:
         """Names of the corners."""
+        return (*self.front_ids, *self.back_ids)
+
+    @property
+    def front_ids(self) -> tuple[str, ...]:
+        """Names of the corners on the front."""
         count = (self.columns - 1) * (self.rows - 1)
         return tuple(f"{self.name}-{k:03d}" for k in range(count))
+
+    @property
+    def back_ids(self) -> tuple[str, ...]:
+        """Names of the corners on the back, none when it shows none."""
+        if self.back_mm is None:
+            return ()
+        return tuple(f"{name}-back" for name in self.front_ids)
 
     def carrier(self) -> Carrier:
         """The plate as calibration sees it, at its printed size."""
         grid = self.corner_grid_mm * self.scale
-        nominal = np.column_stack([grid, np.zeros(len(grid))])
+        sides = (0.0,) if self.back_mm is None else (0.0, self.back_mm)
+        nominal = np.concatenate([np.insert(grid, 2, depth, axis=1) for depth in sides])
         sigma = np.broadcast_to(self.sigma_mm, nominal.shape)
-        return Carrier(self.name, self.ids, nominal, sigma, self.fixed)
+        return Carrier(self.name, self.ids, nominal, sigma, self.fixed, len(sides) > 1)
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ What all have: the target set as input ``targets``, the pictures as in
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from calibration.acceptance import LengthLimit, Volume, accept, certificate_pdf
@@ -50,9 +51,11 @@ def calibration(
     """Calibrate all cameras; writes ``calibration.json``, ``report.html``, ``detections.json``."""
     plan = read_targets(task.inputs["targets"])
     views: list[DetectionView] = []
-    seen = see(plan, task, running, lambda found: views.extend(detection_views(found)))
+    seen = see(plan, task, running, lambda found: views.extend(detection_views(found)), True)
     options = _options(task.request, task.inputs)
     done = calibrate(seen.observations, options, _after(running.report), running.cancel)
+    warnings = (*seen.left_out, *seen.thrown_out(), *done.quality.warnings)
+    done = replace(done, quality=replace(done.quality, warnings=warnings))
     record = CalibrationRecord(task.request.name, task.run.made_utc, done)
     write_calibration(task.folder / "calibration.json", record)
     _write(task.folder / "report.html", calibration_page(record, views))

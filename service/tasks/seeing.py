@@ -35,8 +35,11 @@ def see(
     task: Task[RequestT, ResultT],
     running: Running,
     look: Callable[[DetectedPictures], None] | None = None,
+    leave_mirrored: bool = False,
 ) -> DetectedPictures:
     """The targets of ``plan`` in the pictures that a task was given.
+
+    ``leave_mirrored``: without the cameras that see them in a mirror only.
 
     ``look`` is called while the pictures are still there: those of an archive are unpacked for
     as long as this takes.
@@ -61,6 +64,7 @@ def see(
                 progress=within,
                 cancel=running.cancel,
                 executor=executor,
+                leave_mirrored=leave_mirrored,
             )
         if look is not None:
             look(seen)

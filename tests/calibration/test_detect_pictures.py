@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import io
 import pickle
 import threading
@@ -13,7 +14,8 @@ import pytest
 import target_scenes as scenes
 from PIL import Image
 
-from calibration.detection.gates import Gates
+from calibration.detection.finding import find_targets
+from calibration.detection.gates import Gates, Rejection, Rule
 from calibration.detection.images import decoded, picture_from, read_picture
 from calibration.detection.pictures import DetectionJob, TakenPicture, detect_pictures
 from calibration.targets.kinds import TargetPlan
@@ -144,3 +146,34 @@ def test_lists_that_cannot_be_are_refused(image: np.ndarray) -> None:
         with pytest.raises(InputError, match=problem) as caught:
             detect_pictures(pictures, PLAN)
         assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("flip", [np.s_[:, ::-1], np.s_[::-1]], ids=["mirrored", "upside down"])
+def test_a_camera_that_sees_a_mirror_image_is_left_out_and_told(
+    image: np.ndarray, flip: tuple[slice, ...]
+) -> None:
+    other = np.ascontiguousarray(image[flip])
+    pictures = [TakenPicture(camera, "1", image) for camera in ("left", "right")]
+    pictures.insert(1, TakenPicture("behind", "1", other))
+    found = detect_pictures(pictures, PLAN, leave_mirrored=True)
+    assert found.observations.cameras == ("left", "right")
+    assert found.counts() == {"left": 12, "behind": 0, "right": 12}
+    (sentence,) = found.left_out
+    assert sentence.startswith("behind sees the targets in a mirror only and was left out")
+    assert "back_mm" in sentence
+    with pytest.raises(InputError, match=r"camera behind: the picture is mirrored.*back_mm"):
+        detect_pictures(pictures, PLAN)
+    # One camera alone that sees them as they are says nothing about which is right.
+    with pytest.raises(InputError, match="camera behind: the picture is mirrored"):
+        detect_pictures(pictures[:2], PLAN, leave_mirrored=True)
+
+
+def test_many_targets_out_of_their_places_are_told(image: np.ndarray) -> None:
+    pictures = [TakenPicture("left", "1", image), TakenPicture("right", "1", image)]
+    assert detect_pictures(pictures, PLAN).thrown_out() == ()
+    found = find_targets(image, PLAN)
+    lost = Rejection("plate-000", Rule.HOMOGRAPHY, 2.0, 1.0, (0.0, 0.0))
+    some = dataclasses.replace(found, rejections=(lost,) * 4)
+    seen = dataclasses.replace(detect_pictures(pictures, PLAN), detections=(found, some))
+    (sentence,) = seen.thrown_out()
+    assert sentence.startswith("25% of the targets that right saw were not used")

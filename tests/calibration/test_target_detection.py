@@ -7,12 +7,14 @@ import dataclasses
 import numpy as np
 import pytest
 import target_scenes as scenes
+from held_patterns import placed_carrier
 
 from calibration.detection.finding import find_targets
 from calibration.detection.gates import Gates, Rule
 from calibration.detection.selftest import check_opencv
 from calibration.detection.selftest import opencv as shim
 from calibration.targets.kinds import CarrierKind, CharucoPlate, TargetPlan
+from calibration.targets.rendering import photographed, render
 from common.errors import DeviceError, InputError
 from geometry.arrays import Floats, Ints
 
@@ -199,6 +201,28 @@ def test_mirrored_pictures_are_noticed(kind: CarrierKind) -> None:
     found = find_targets(np.ascontiguousarray(image[:, ::-1]), plan(kind))
     assert len(found) == 0
     assert [f.code for f in found.findings] == ["mirrored"]
+
+
+def test_the_back_of_a_plate_is_a_target_of_its_own() -> None:
+    plate = dataclasses.replace(scenes.PLATE, back_mm=3.0)
+    carrier = plate.carrier()
+    # From behind, turned about the upright axis: the paper of the back is nearer by the thickness.
+    turn = scenes.rotation(12.0, 180.0, 4.0)
+    view, front = scenes.camera(), scenes.middle_mm(scenes.PLATE)
+    way = np.array([0.3, -0.2, 230.0]) - turn @ front
+    side = placed_carrier(scenes.PLATE, turn, way + turn @ np.array([0.0, 0.0, 3.0]))
+    image = photographed(render(view, side, 0.7, 30.0, 220.0, 150.0), 2.0, 1)
+    found = find_targets(image, plan(plate))
+    assert found.ids == plate.back_ids
+    assert found.findings == ()
+    local = carrier.nominal_mm @ turn.T + way
+    pixels = view.pixels(local[:, :2] / local[:, 2:])
+    truth = dict(zip(carrier.ids, pixels, strict=True))
+    assert np.abs(scenes.errors(found, truth)).max() < 0.05
+    # The front is still the front, and a plate that is told to have one side only is mirrored.
+    shown, _ = scenes.shot(scenes.PLATE, view, scenes.rotation(12.0), 230.0)
+    assert find_targets(shown, plan(plate)).ids == plate.front_ids
+    assert [f.code for f in find_targets(image, plan(scenes.PLATE)).findings] == ["mirrored"]
 
 
 def test_the_self_test_passes_and_refuses_half_a_pixel() -> None:

@@ -40,7 +40,9 @@ def test_what_is_written_is_read(
     plan = TargetPlan(
         name,
         (
-            CharucoPlate("plate", 8, 6, 20.5, 15.0, "DICT_5X5_100", 3, flag, ruler=ruler),
+            CharucoPlate(
+                "plate", 8, 6, 20.5, 15.0, "DICT_5X5_100", 3, flag, ruler=ruler, back_mm=4.0
+            ),
             MarkerCarrier("tags", "DICT_4X4_50", 30.0, (place,), dot=flag, inverted=not flag),
             RingCarrier("stand", 3.0, (place,), RingCodeFamily(14), fixed=flag),
             bar,

@@ -17,8 +17,10 @@ def test_the_page_lists_the_rules_as_they_are() -> None:
 
 
 def test_the_example_can_be_read() -> None:
-    example, boards = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
+    example, boards, back = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
     plan = targets_from(example)
     assert [c.name for c in plan.carriers] == ["plate", "stand", "bar"]
     assert plan.distances[0].length_mm == 200.03
     assert [c.name for c in targets_from(boards).carriers] == ["chess", "kalibr", "dots"]
+    head = 'schema = "rigwright.targets/1"\nname = "two sides"\n'
+    assert targets_from(head + back).carriers[0].ids[-1] == "plate-011-back"

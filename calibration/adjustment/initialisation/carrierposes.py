@@ -120,7 +120,7 @@ def _cost(
 
 def _points_by_place(rays: RowRays, places: int, targets: int) -> Floats:
     """Targets in the world at each place, (places, targets, 3), NaN where rays do not meet."""
-    used = finite_rows(rays.origin)
+    used = finite_rows(rays.origin) & finite_rows(rays.way)
     group = rays.place[used] * targets + rays.target[used]
     points = nearest_points(rays.origin[used], rays.way[used], group, places * targets)
     return points.reshape(places, targets, 3)

@@ -11,7 +11,7 @@ from calibration.adjustment.camera import Interior
 from calibration.adjustment.initialisation.views import is_planar
 from calibration.adjustment.rotations import rotation_of
 from geometry.arrays import Bools, Floats
-from geometry.camera import NO_DISTORTION, perspective
+from geometry.camera import perspective
 
 MAX_VIEWS = 15
 """Plates beyond this many add nothing to a start but time."""
@@ -75,22 +75,38 @@ def interior_from_planes(
     flat = [_in_plane(points)[0] for points, _ in views]
     objects = [np.ascontiguousarray(p, np.float32) for p in flat]
     images = [np.ascontiguousarray(p, np.float32).reshape(-1, 1, 2) for _, p in views]
-    flags = cv2.CALIB_FIX_K2 | cv2.CALIB_FIX_K3 | cv2.CALIB_ZERO_TANGENT_DIST
-    flags |= cv2.CALIB_FIX_ASPECT_RATIO | cv2.CALIB_USE_INTRINSIC_GUESS
+    held = cv2.CALIB_ZERO_TANGENT_DIST | cv2.CALIB_FIX_ASPECT_RATIO
+    held |= cv2.CALIB_USE_INTRINSIC_GUESS
+    higher = [cv2.CALIB_FIX_K2 | cv2.CALIB_FIX_K3, cv2.CALIB_FIX_K3, 0]
     if len(views) < 4:
-        flags |= cv2.CALIB_FIX_PRINCIPAL_POINT | cv2.CALIB_FIX_K1
-    try:
-        guess = cv2.initCameraMatrix2D(objects, images, size_px, 1.0)
-        _, matrix, terms, _, _ = cv2.calibrateCamera(
-            objects, images, size_px, guess, np.zeros(5), flags=flags
-        )
-    except cv2.error:
-        return None  # the views do not determine a camera
-    f, distortion = float(matrix[0, 0]), NO_DISTORTION.copy()
-    distortion[0] = float(np.ravel(terms)[0])
-    if not np.isfinite([f, *distortion]).all() or not 0.2 < f / max(size_px) < 50.0:
+        held |= cv2.CALIB_FIX_PRINCIPAL_POINT | cv2.CALIB_FIX_K1
+        higher = higher[:1]
+    found = None
+    for terms in higher:
+        try:
+            guess = cv2.initCameraMatrix2D(objects, images, size_px, 1.0)
+            _, matrix, told, _, _ = cv2.calibrateCamera(
+                objects, images, size_px, guess, np.zeros(5), flags=held | terms
+            )
+        except cv2.error:
+            return found  # the views do not determine a camera
+        found = _start_of(matrix, np.ravel(told)[:5], size_px) or found
+        # A few terms of a wide lens fold back within the picture: more of them may not.
+        if found is not None and _sees_all(found, views):
+            break
+    return found
+
+
+def _start_of(matrix: Floats, terms: Floats, size_px: tuple[int, int]) -> Interior | None:
+    f = float(matrix[0, 0])
+    if not np.isfinite([f, *terms]).all() or not 0.2 < f / max(size_px) < 50.0:
         return None
-    return Interior(f, np.array([matrix[0, 2], matrix[1, 2]]), distortion)
+    return Interior(f, np.array([matrix[0, 2], matrix[1, 2]]), terms)
+
+
+def _sees_all(interior: Interior, views: list[tuple[Floats, Floats]]) -> bool:
+    """Whether every pixel with a target has a ray."""
+    return all(np.isfinite(interior.normalised(pixels)).all() for _, pixels in views)
 
 
 def _in_plane(points: Floats) -> tuple[Floats, Floats]:
