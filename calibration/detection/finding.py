@@ -17,7 +17,7 @@ from calibration.detection.boards import (
 )
 from calibration.detection.carriers import carrier_strangers
 from calibration.detection.detections import Detections, PictureProblem, Point
-from calibration.detection.diagnosis import diagnose
+from calibration.detection.diagnosis import FEW, diagnose
 from calibration.detection.gates import Gates, Rejection, Rule
 from calibration.detection.images import Picture, picture_from, read_picture
 from calibration.detection.markers import marker_points
@@ -97,8 +97,10 @@ def _square_targets(
         for carrier in mine:
             if isinstance(carrier, CharucoPlate):
                 found = plate_points(sight.picture, carrier, markers, gates)
-                if carrier.back_mm is not None and not found[0]:
-                    found = _back_points(sight.picture, carrier, gates)
+                if carrier.back_mm is not None and len(found[0]) <= FEW:
+                    # Some codes look the same in a mirror: a few corners of the front are no front.
+                    back = _back_points(sight.picture, carrier, gates)
+                    found = max(found, back, key=lambda side: len(side[0]))
             else:
                 found = marker_points(sight.picture, carrier, markers, gates)
             points += found[0]

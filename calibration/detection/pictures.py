@@ -27,7 +27,7 @@ _EXPLAINED = 3
 _LEAST_STRAIGHT = 2
 _MISPLACED = (Rule.FIT, Rule.HOMOGRAPHY, Rule.POSE)
 _MANY = 0.2
-"""Share of targets: of ten pictures of real plates in webcams at most a twentieth is lost so."""
+"""Share of targets that is worth a sentence when it is lost."""
 _MIRRORED = (
     "{camera} sees the targets in a mirror only and was left out: it looks at the back of a plate "
     "(then give back_mm, the plate's thickness, in the target file), or its pictures are flipped "
@@ -72,22 +72,21 @@ class DetectedPictures:
         return total
 
     def thrown_out(self) -> tuple[str, ...]:
-        """A sentence for each camera of whose targets many do not lie where they should."""
-        lost: Counter[str] = Counter()
+        """A sentence for each camera of whose targets many did not pass the gates."""
+        lost: dict[str, Counter[str]] = {name: Counter() for name in self.observations.cameras}
         for picture, found in zip(self.pictures, self.detections, strict=True):
-            lost[picture.camera] += sum(r.rule in _MISPLACED for r in found.rejections)
-        shares = {
-            camera: lost[camera] / (lost[camera] + count)
-            for camera, count in self.counts().items()
-            if lost[camera]
-        }
-        return tuple(
-            f"{share:.0%} of the targets that {camera} saw were not used, because they do not lie "
-            "or look as described: check the target file against the targets, and whether they are "
-            "flat."
-            for camera, share in shares.items()
-            if share > _MANY
-        )
+            rules = (r.rule.value for r in found.rejections if r.rule in _MISPLACED)
+            if picture.camera in lost:
+                lost[picture.camera].update(rules)
+        counts, sentences = self.counts(), []
+        for camera, rules in lost.items():
+            share = rules.total() / max(rules.total() + counts[camera], 1)
+            if share > _MANY:
+                sentences.append(
+                    f"{share:.0%} of the targets that {camera} saw were not used, most by rule "
+                    f"{rules.most_common(1)[0][0]}."
+                )
+        return tuple(sentences)
 
 
 @dataclass(frozen=True, eq=False)

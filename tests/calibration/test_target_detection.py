@@ -222,6 +222,10 @@ def test_the_back_of_a_plate_is_a_target_of_its_own() -> None:
     # The front is still the front, and a plate that is told to have one side only is mirrored.
     shown, _ = scenes.shot(scenes.PLATE, view, scenes.rotation(12.0), 230.0)
     assert find_targets(shown, plan(plate)).ids == plate.front_ids
+    # Some markers are read from behind, too, as others: the side that shows more is the one seen.
+    both = np.hstack([image, shown[:, :150]])
+    assert 0 < len(find_targets(np.ascontiguousarray(shown[:, :150]), plan(plate))) <= 8
+    assert find_targets(both, plan(plate)).ids == plate.back_ids
     assert [f.code for f in find_targets(image, plan(scenes.PLATE)).findings] == ["mirrored"]
 
 
