@@ -79,12 +79,12 @@ class DetectedPictures:
             if picture.camera in lost:
                 lost[picture.camera].update(rules)
         counts, sentences = self.counts(), []
-        for camera, rules in lost.items():
-            share = rules.total() / max(rules.total() + counts[camera], 1)
+        for camera, by_rule in lost.items():
+            share = by_rule.total() / max(by_rule.total() + counts[camera], 1)
             if share > _MANY:
                 sentences.append(
                     f"{share:.0%} of the targets that {camera} saw were not used, most by rule "
-                    f"{rules.most_common(1)[0][0]}."
+                    f"{by_rule.most_common(1)[0][0]}."
                 )
         return tuple(sentences)
 

@@ -55,7 +55,7 @@ def mapped(matrix: Floats, places: Floats) -> tuple[Floats, Floats]:
     return pixel, slope / ends[:, 2:, None]
 
 
-LEAST_TO_STRAIGHTEN = 16
+LEAST_TO_STRAIGHTEN = 10
 BENDS = np.linspace(-0.9, 0.5, 29)
 BETTER = 0.5
 

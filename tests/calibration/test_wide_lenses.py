@@ -43,6 +43,14 @@ def test_corners_of_a_plate_that_fills_a_wide_picture_are_kept(
     assert np.sqrt(np.mean(errors(found, truth) ** 2)) < 0.05
 
 
+def test_the_few_corners_of_a_small_plate_near_the_edge_are_kept() -> None:
+    plate = CharucoPlate("plate", 4, 5, 20.0, 15.0, "DICT_4X4_50")
+    view = wide(500.0, [-0.28, 0.07, 0.0, 0.0, -0.006])
+    image, _ = shot(plate, view, np.eye(3), 110.0, shift_mm=(-60.0, 35.0))
+    found = find_targets(image, TargetPlan("set", (plate,)))
+    assert found.ids == plate.ids, [str(r) for r in found.rejections]
+
+
 def test_a_corner_out_of_its_place_is_still_thrown_out() -> None:
     plate = CharucoPlate("plate", 10, 8, 20.0, 15.0, "DICT_5X5_100")
     view = wide(400.0, [-0.25, 0.06, 0.0, 0.0, -0.005])
