@@ -9,11 +9,11 @@ import numpy as np
 
 from common.errors import CancelledError, InputError
 from common.progress import CancelToken, NeverCancelled, Progress, ProgressCallback, ignore_progress
-from geometry.arrays import Floats
+from geometry.arrays import Floats, Ints
 from geometry.camera import Camera, RigCamera
 from geometry.frames import Pose
 from geometry.subject import Subject
-from solver.coverage.views import NEAR, judge
+from solver.coverage.views import judge
 from solver.infeasibility import conflicts
 from solver.limits import Limits
 from solver.outer_loop import StartResult
@@ -28,11 +28,12 @@ from solver.strategy import Strategy
 
 ENGINE = "sequential quadratic programming with exact second derivatives (PIQP)"
 _EXPECTED_OUTER_ITERATIONS = 8
-_FINE = 2
+_FINE = 4
 """How many networks of the search are optimised continuously."""
 
 _REFINEMENT_COST = 1.01
 _REFINEMENT_TRIES = 3
+_MOST_NAMED = 100
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,6 +149,9 @@ def design(
     tell.stage("refine", 0.93)
     values, quality, kkt, why, iterations = _finish(problem, results[best], scores[best], token)
     begin = evaluate(subject, problem.cameras, limits, problem.anchor)
+    if best != 0 and start is not None:
+        # Another start won; what was given must not be better than that.
+        problem, begin = _better_given(jobs[0].problem, problem, begin, quality)
     if _rank(begin) < _rank(quality):
         values, quality, kkt = problem.start_values(), begin, np.nan  # nobody solved there
         why = "no solve found anything better than the start"
@@ -309,10 +313,9 @@ def _finish(
 ) -> tuple[Floats, Quality, float, str, int]:
     """Bring the winner to the last digit, unless that would cost it a limit.
 
-    A refinement that loses a point is repeated with that point named for more views.
+    A refinement that loses a point, or views of it that count, is repeated with that point named.
     """
-    # A search ends so near an optimum that a second try with more points finds nothing else.
-    for _ in range(1 if result.reach == NEAR else _REFINEMENT_TRIES):
+    for _ in range(_REFINEMENT_TRIES):
         outcome = refine(problem, result, cancel)
         refined = evaluate(
             problem.subject, problem.placed(outcome.values), problem.limits, problem.anchor
@@ -324,10 +327,27 @@ def _finish(
         judged = judge(problem, problem.unknowns.state(outcome.values))
         result = replace(
             result,
-            added_points=np.union1d(result.added_points, judged.missed),
+            added_points=np.unique(
+                np.concatenate([result.added_points, judged.missed, _worsened(quality, refined)])
+            ),
             margins=result.margins.wider(judged.shortfall),
         )
     return result.values, quality, optimality_error(problem, result), result.why, 0
+
+
+def _better_given(
+    given: Problem, problem: Problem, begin: Quality, found: Quality
+) -> tuple[Problem, Quality]:
+    """The given start and its quality where it beats what was found; else what is there."""
+    quality = evaluate(given.subject, given.cameras, given.limits, given.anchor)
+    return (given, quality) if _rank(quality) < _rank(found) else (problem, begin)
+
+
+def _worsened(before: Quality, after: Quality) -> Ints:
+    """Check points (k,) whose covariance grew most, at most so many as a solve can hold."""
+    grown = after.points.norm_mm2 - before.points.norm_mm2
+    worst = np.argsort(-grown, kind="stable")[:_MOST_NAMED]
+    return np.asarray(worst[grown[worst] > 0.0])
 
 
 def _status(quality: Quality, kkt: float) -> Status:

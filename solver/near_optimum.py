@@ -4,7 +4,8 @@ The outer loop of :mod:`solver.outer_loop` lets cameras go where the frozen rays
 network that leads away from it, because rays that go lost have to be won back. Here an outer
 iteration stays within a box about the best network so far. It is taken when the network it finds
 is better with the rays that it really has, and the box grows; otherwise the box shrinks, and what
-went wrong - a point hidden, out of frame, or no longer seen often enough - is held on to.
+went wrong - a point hidden, out of frame, or no longer seen often enough - is held on to, and so
+is every view until a move helps again.
 """
 
 from __future__ import annotations
@@ -83,11 +84,15 @@ class _Network:
 
 @dataclass(frozen=True, eq=False)
 class _Held:
-    """What earlier moves went wrong by: framed points (n, q), check points to add, cuts."""
+    """What earlier moves went wrong by: framed points (n, q), check points to add, cuts.
+
+    A point with no more than ``views`` of them keeps each.
+    """
 
     framed: Bools
     added_points: Ints
     cuts: VisibilityCuts
+    views: int = FEW_VIEWS
 
 
 def _better(one: Merit, other: Merit, scale: float) -> bool:
@@ -147,7 +152,8 @@ def _moved(
     """Solve within a box about the best network; also the cuts of rays that go lost there."""
     problem = with_points(problem, np.union1d(held.added_points, best.weak))
     state = problem.unknowns.state(best.values)
-    seen = holding_scarce(problem, views(problem, state, None, _MARGINS, NEAR))
+    seen = views(problem, state, None, _MARGINS, NEAR)
+    seen = holding_scarce(problem, seen, held.views)
     seen = replace(seen, framed=seen.framed | held.framed)
     rows = candidate_constraints(problem, state, seen)
     rows += cut_constraints(problem, held.cuts.of(seen.assigned))
@@ -193,7 +199,9 @@ def run_near(problem: Problem, report: Report, cancel: CancelToken) -> StartResu
                 found.merit.cost > best.merit.cost * (1.0 - _SETTLED)
             )
             best, outcome, half = found, trial, min(1.5 * half, LARGEST_BOX)
-            held = replace(held, framed=found.seen.framed, cuts=VisibilityCuts.none())
+            held = replace(
+                held, framed=found.seen.framed, cuts=VisibilityCuts.none(), views=FEW_VIEWS
+            )
             if settled:
                 why = f"another move gained less than {_SETTLED:g} of the cost"
                 break
@@ -202,6 +210,7 @@ def run_near(problem: Problem, report: Report, cancel: CancelToken) -> StartResu
                 held.framed | found.seen.framed,
                 np.union1d(held.added_points, found.judged.missed),
                 held.cuts.joined(lost),
+                problem.count,
             )
             half *= 0.4
             if half < SMALLEST_BOX:

@@ -86,11 +86,10 @@ def evaluate(
     found = [Observations.of(problem, position) for position in problem.visibility_positions]
     rest = found[0]
     points = _points(problem, rest)
-    norms = np.linalg.norm(points.covariance_mm2, axis=(1, 2))
     seen = int(rest.visible.sum())
     coverage = _coverage(problem, found)
     return Quality(
-        cost_mm2=float(norms.mean()),
+        cost_mm2=float(points.norm_mm2.mean()),
         sigma_median_mm=float(np.median(points.sigma_mm)),
         sigma_p95_mm=float(np.percentile(points.sigma_mm, 95.0)),
         sigma_max_mm=float(points.sigma_mm.max()),

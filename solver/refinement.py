@@ -20,10 +20,13 @@ from solver.outer_loop import StartResult
 from solver.problem import Problem
 
 _RADIUS = 0.02
-_MAX_STEPS = 120
-_MAX_STEPS_NEAR = 40
+_MAX_STEPS, _MAX_ROUGH_STEPS = 120, 40
 _PASSES = 3
-_TIGHT = 1e-6
+_TIGHT, _TIGHT_NEAR = 1e-6, 3e-5
+"""Errors of the optimality conditions to end with. Of many views held each, the rows bend so often
+that more digits take as many steps again."""
+_GAIN, _ROUGH_GAIN = 1e-13, 1e-5
+"""Of three steps, at which a pass ends: what another pass will change needs no last digits."""
 
 
 def refine(problem: Problem, result: StartResult, cancel: CancelToken) -> Outcome:
@@ -38,28 +41,45 @@ def refine(problem: Problem, result: StartResult, cancel: CancelToken) -> Outcom
         opening = opening_directions(problem, state, seen.assigned)
         cuts = VisibilityCuts.none()
         found, known = values, None
-        for _ in range(_PASSES):
-            outcome = minimise(
-                _program(problem, values, seen, cuts),
-                found,
-                lambda *_: not cancel.is_set(),
-                tolerance=_TIGHT,
-                gain_tolerance=1e-13,
-                known=known,
-                max_iterations=_MAX_STEPS if result.reach == FAR else _MAX_STEPS_NEAR,
-                radius=_RADIUS,
-            )
+        rough = result.reach != FAR
+        tolerance = _TIGHT_NEAR if rough else _TIGHT
+        for k in range(_PASSES):
+            rough = rough and k + 1 < _PASSES
+            program = _program(problem, values, seen, cuts)
+            outcome = _pass(program, found, known, tolerance, rough, cancel)
             found, known = outcome.values, outcome.multipliers
             after = problem.unknowns.state(found)
             lost = cuts_for_hidden(problem, after, seen.assigned, opening)
             entered = _entered(problem, found, seen, result)
-            if outcome.stopped or (len(lost.camera) == 0 and entered is None):
+            clean = len(lost.camera) == 0 and entered is None
+            if outcome.stopped or (clean and not rough):
                 break
+            rough = rough and not clean
             cuts = cuts.joined(lost)
             if entered is not None:
                 # Other points are framed, so the rows are others, too.
                 seen, known = entered, None
         return outcome
+
+
+def _pass(
+    program: NonlinearProgram,
+    values: Floats,
+    known: list[Floats] | None,
+    tolerance: float,
+    rough: bool,
+    cancel: CancelToken,
+) -> Outcome:
+    return minimise(
+        program,
+        values,
+        lambda *_: not cancel.is_set(),
+        tolerance=tolerance,
+        gain_tolerance=_ROUGH_GAIN if rough else _GAIN,
+        known=known,
+        max_iterations=_MAX_ROUGH_STEPS if rough else _MAX_STEPS,
+        radius=_RADIUS,
+    )
 
 
 def optimality_error(problem: Problem, result: StartResult) -> float:
@@ -75,7 +95,8 @@ def _views(problem: Problem, result: StartResult) -> Views:
     """What is seen and promised where a start ended."""
     state = problem.unknowns.state(result.values)
     seen = views(problem, state, None, result.margins, result.reach)
-    return seen if result.reach == FAR else holding_scarce(problem, seen)
+    # A solve that may lose views ends where they are lost, which is no optimum of anything.
+    return seen if result.reach == FAR else holding_scarce(problem, seen, problem.count)
 
 
 def _program(

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 
+import numpy as np
+
 from geometry.arrays import Floats, Ints
 from geometry.camera import RigCamera
 from geometry.surface import SurfacePoints
@@ -71,6 +73,11 @@ class PointTable:
     sigma_mm: Floats
     views: Ints
     in_focus: Ints
+
+    @property
+    def norm_mm2(self) -> Floats:
+        """Norm of the eigenvalues of each covariance, (N,): what the cost is the mean of."""
+        return np.asarray(np.linalg.norm(self.covariance_mm2, axis=(1, 2)))
 
 
 @dataclass(frozen=True, eq=False)

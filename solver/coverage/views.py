@@ -63,14 +63,14 @@ class Views:
         return Views(seen, self.framed, assigned, self.margin_deg)
 
 
-def holding_scarce(problem: Problem, seen: Views) -> Views:
-    """The views with those of points that have one or two promised as well.
+def holding_scarce(problem: Problem, seen: Views, most_views: int = FEW_VIEWS) -> Views:
+    """The views with those of points that have at most ``most_views`` promised as well.
 
     Where so few cameras see a point, losing one of them costs more than a good network gains by
     moving; tiers leave such points out, because they are the hardest.
     """
     free = np.array([not c.fixed for c in problem.cameras])
-    scarce = seen.seen & (seen.seen.sum(axis=0) <= FEW_VIEWS) & free[:, None]
+    scarce = seen.seen & (seen.seen.sum(axis=0) <= most_views) & free[:, None]
     scarce[seen.assigned.camera, seen.assigned.point] = False
     camera, point = np.nonzero(scarce)
     return replace(

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
 
 from common.errors import CancelledError
 from common.progress import CancelToken, NeverCancelled
@@ -127,9 +126,9 @@ def candidates(
         sees = _sight(subject.check_points, subject, limits, eye, NEAR.framed_deg)[0]
         if sees.sum() < _LEAST_SEEN:
             continue
-        corners = _corners(subject.check_points.points_mm[sees])
-        pose = _pose(camera, limits, corners, direction, middle)
-        found.append(camera_at(camera, f"at{len(found)}", pose, corners))
+        seen_mm = subject.check_points.points_mm[sees]
+        pose = _pose(camera, limits, seen_mm, direction, middle)
+        found.append(camera_at(camera, f"at{len(found)}", pose, seen_mm))
     found = _where_allowed(subject, limits, found)
     whole = replace(subject, design_points=points)
     return _weighed(whole, limits, (*found, *fixed), len(fixed), middle)
@@ -139,14 +138,6 @@ def _thinned(points: SurfacePoints, most: int) -> SurfacePoints:
     """At most so many of the points, evenly through their order, which is random."""
     step = max(1, len(points) // most)
     return points.subset(np.arange(0, len(points), step))
-
-
-def _corners(points_mm: Floats) -> Floats:
-    """The corners of the points' convex hull: what frame and focus are decided by."""
-    try:
-        return np.asarray(points_mm[ConvexHull(points_mm).vertices])
-    except (QhullError, ValueError):
-        return points_mm
 
 
 def _pose(camera: Camera, limits: Limits, points_mm: Floats, away: Floats, middle: Floats) -> Pose:

@@ -10,6 +10,7 @@ import numpy as np
 from geometry.arrays import Bools, Floats, Ints
 from solver.limits import Limits
 from solver.search.candidates import Candidates
+from solver.search.sight import in_each_others_view
 
 _AT_A_TIME = 24
 """Candidates weighed at a time: what a few hundred points of them take stays in the cache."""
@@ -46,7 +47,7 @@ class Search:
 
     @cached_property
     def too_close(self) -> Bools:
-        """Pairs (m, m) that no network may hold: base/height or bodies."""
+        """Pairs (m, m) that no network may hold: base/height, bodies, one in the other's view."""
         limit, pool = self.limits.base_height, self.candidates
         ratio = pool.base_height
         out = np.zeros(ratio.shape, dtype=np.bool_)
@@ -57,6 +58,12 @@ class Search:
         if self.limits.body_clearance_mm is not None:
             reach = np.array([np.linalg.norm(c.camera.body.size_mm) / 2.0 for c in pool.cameras])
             out |= pool.gap_mm < reach[:, None] + reach[None] + self.limits.body_clearance_mm
+        if self.limits.sight_line_clearance_mm is not None:
+            seen = in_each_others_view(pool.cameras, self.limits.sight_line_clearance_mm)
+            # What stands already is not for the search to judge.
+            first_fixed = len(pool) - pool.fixed
+            seen[first_fixed:, first_fixed:] = False
+            out |= seen
         np.fill_diagonal(out, val=True)
         return out
 

@@ -283,3 +283,7 @@ def test_points_with_few_views_are_promised_those_that_they_have() -> None:
     # Of the fixed camera nothing is promised, and what is seen is kept.
     kept = dict(zip(pairs, found.assigned.kept.tolist(), strict=True))
     assert all(kept[pair] for pair in scarce)
+    # Asked for all of them, every view of a free camera is promised.
+    every = holding_scarce(problem, seen, problem.count).assigned
+    held = {*zip(every.camera.tolist(), every.point.tolist(), strict=True)}
+    assert held == before | {(int(c), int(p)) for c, p in np.argwhere(seen.seen) if c > 0}

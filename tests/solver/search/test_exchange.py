@@ -114,7 +114,7 @@ def test_a_cancelled_search_says_so_before_it_looks() -> None:
 def test_a_search_that_is_told_to_stop_returns_what_it_has() -> None:
     cancel = threading.Event()
     cancel.set()
-    search = Search(pool(1), Limits(body_clearance_mm=None))
+    search = Search(pool(1), Limits(body_clearance_mm=None, sight_line_clearance_mm=None))
     (found,) = exchange(search, search, 3, 0, cancel)
     assert len(found.network) == 5
 
@@ -122,7 +122,7 @@ def test_a_search_that_is_told_to_stop_returns_what_it_has() -> None:
 @settings(max_examples=8, deadline=None, derandomize=True)
 @given(st.integers(0, 1000), st.integers(1, 5))
 def test_a_shake_moves_at_most_three_free_cameras_and_keeps_the_rest(seed: int, count: int) -> None:
-    search = Search(pool(seed), Limits(body_clearance_mm=None))
+    search = Search(pool(seed), Limits(body_clearance_mm=None, sight_line_clearance_mm=None))
     network = search.grown(search.fixed, count)
     shaken = module._shaken(search, network, np.random.default_rng(seed))
     assert len(shaken) == len(network)
@@ -136,7 +136,7 @@ def test_a_shake_moves_at_most_three_free_cameras_and_keeps_the_rest(seed: int, 
 @settings(max_examples=4, deadline=None, derandomize=True)
 @given(st.integers(0, 1000))
 def test_shaking_never_ends_worse_than_exchanging_alone(seed: int) -> None:
-    search = Search(pool(seed), Limits(body_clearance_mm=None))
+    search = Search(pool(seed), Limits(body_clearance_mm=None, sight_line_clearance_mm=None))
     alone = search.score(search.exchanged(search.grown(search.fixed, 3)))
     found = exchange(search, search, 3, seed, NEVER, shakes=4)
     # Sums in another order differ in the last digits.
