@@ -15,8 +15,9 @@ USER rigwright
 ENV RIGWRIGHT_HOST=0.0.0.0 RIGWRIGHT_PORT=8000 RIGWRIGHT_DATA_DIR=/data
 VOLUME /data
 EXPOSE 8000
-# The service answers at once even while jobs run, so a slow answer is a fault.
+# The service answers at once even while jobs run, so a slow answer is a fault. The page itself
+# needs no key.
 HEALTHCHECK --interval=30s --timeout=5s --start-period=20s CMD \
-    ["python", "-c", "from urllib.request import urlopen; urlopen('http://127.0.0.1:8000/v1/health', timeout=4)"]
+    ["python", "-c", "from urllib.request import urlopen; urlopen('http://127.0.0.1:8000/', timeout=4)"]
 STOPSIGNAL SIGTERM
 CMD ["rigwright", "serve"]

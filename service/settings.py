@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ipaddress
 import os
 import socket
 from pathlib import Path
@@ -48,6 +49,13 @@ class Settings(BaseSettings):
             "commas, such as `http://lab.example:3000`."
         ),
     ] = ()
+    require_keys: Annotated[
+        bool,
+        Field(
+            description="Whether 127.0.0.1 asks for keys as well, as every other address does: "
+            "behind a proxy, for example."
+        ),
+    ] = False
     root_path: Annotated[
         str,
         Field(
@@ -109,9 +117,24 @@ class Settings(BaseSettings):
         return ("localhost", machine, f"{machine}.local", self.host, *self.allowed_hosts)
 
     @property
+    def asks_for_keys(self) -> bool:
+        """Whether others than this machine may reach the service, or keys are wanted anyway."""
+        return self.require_keys or not _this_machine_only(self.host)
+
+    @property
     def sessions_folder(self) -> Path:
         """Where sessions are photographed into."""
         return self.sessions_dir or self.data_dir / "sessions"
+
+
+def _this_machine_only(host: str) -> bool:
+    if host == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        # A name may lead anywhere, and may lead elsewhere tomorrow.
+        return False
 
 
 def read_settings(**given: object) -> Settings:

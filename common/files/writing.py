@@ -11,8 +11,10 @@ from common.errors import ConflictError, InputError
 LARGEST_BYTES = 200_000_000
 
 
-def write_whole(path: Path, data: bytes, overwrite: bool = False) -> None:
+def write_whole(path: Path, data: bytes, overwrite: bool = False, *, private: bool = False) -> None:
     """Writes to a neighbour, then renames; what is replaced keeps its permissions.
+
+    A ``private`` file is at no moment open to anybody but its owner.
 
     Raises :class:`ConflictError` when the file is there, :class:`InputError` when it cannot be
     written.
@@ -23,12 +25,12 @@ def write_whole(path: Path, data: bytes, overwrite: bool = False) -> None:
         )
     part = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
     try:
-        with part.open("wb") as file:
+        with open(part, "wb", opener=_private if private else None) as file:
             file.write(data)
             file.flush()
             # Renamed first and written later, a file would be empty after a loss of power.
             os.fsync(file.fileno())
-        if path.exists():
+        if path.exists() and not private:
             part.chmod(path.stat().st_mode & 0o7777)
         part.replace(path)
     except OSError as error:
@@ -38,6 +40,10 @@ def write_whole(path: Path, data: bytes, overwrite: bool = False) -> None:
             f"{path.name} cannot be written ({(error.strerror or 'unwritable').lower()})",
             "make its folder writable, or give another",
         ) from error
+
+
+def _private(path: str, flags: int) -> int:
+    return os.open(path, flags, 0o600)
 
 
 def read_limited(path: Path) -> bytes:

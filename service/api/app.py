@@ -28,11 +28,14 @@ from service.api import (
     root,
     scans,
     sessions,
+    signin,
     targetsets,
 )
 from service.api.addresses import Prefix
+from service.api.audited import Audited
 from service.api.conditional import Conditional
 from service.api.context import Service
+from service.api.door import Door
 from service.api.errors import install_error_handlers
 from service.api.gate import Gate
 from service.api.limits import PAUSE_S, BodyLimits
@@ -44,7 +47,10 @@ _DESCRIPTION = (
     "in degrees, times in UTC. Errors are problem details (RFC 9457)."
 )
 
-_ASKED_WITH = ("Content-Type", "X-Rigwright", "Idempotency-Key", "Last-Event-ID", "If-None-Match")
+_ASKED_WITH = (
+    *("Content-Type", "X-Rigwright", "Idempotency-Key", "Last-Event-ID", "If-None-Match"),
+    "Authorization",
+)
 
 
 def make_app() -> FastAPI:
@@ -63,7 +69,7 @@ def make_app() -> FastAPI:
         generate_unique_id_function=lambda route: route.name,
     )
     resources = (
-        *(root, health, metrics, scans, examples, designs, exports, plans, evaluations),
+        *(root, signin, health, metrics, scans, examples, designs, exports, plans, evaluations),
         *(rigs, captures, rigtests, sessions),
         *(targetsets, picturesets, calibrations, checks, acceptances),
     )
@@ -82,9 +88,11 @@ def create_app(service: Service) -> FastAPI:
     app.state.service = service
     settings = service.settings
     app.state.requests = metrics.RequestCounts()
+    routers = (*app.state.routers, page_router, app.router)
     # The last that is added is the first that a request meets.
     app.add_middleware(Conditional)
     app.add_middleware(BodyLimits, stopping=service.stopping.is_set, pause_s=PAUSE_S)
+    app.add_middleware(Door, ring=service.keys, routers=routers)
     if settings.allowed_origins:
         app.add_middleware(
             CORSMiddleware,
@@ -94,6 +102,7 @@ def create_app(service: Service) -> FastAPI:
             expose_headers=("Location", "ETag", "X-Request-ID"),
         )
     app.add_middleware(Gate, hosts=settings.known_hosts, origins=settings.allowed_origins)
+    app.add_middleware(Audited, log=service.audit)
     app.add_middleware(RequestLog, stopping=service.stopping.is_set)
     app.add_middleware(metrics.CountedRequests, counts=app.state.requests)
     app.add_middleware(Prefix, prefix=settings.root_path)

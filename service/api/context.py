@@ -15,6 +15,8 @@ from service.jobs.engine import Engine
 from service.jobs.manager import JobManager
 from service.jobs.notifier import Notifier
 from service.jobs.process import ProcessEngine
+from service.keys.audit import AuditLog
+from service.keys.ring import KeyRing, require_a_key
 from service.kinds.base import JobKind
 from service.settings import Settings
 from service.stations.registry import STATION_KINDS, StationRegistry, read_stations
@@ -34,8 +36,13 @@ class Service:
         engine: Engine | None = None,
     ) -> None:
         self.settings = settings
+        if settings.asks_for_keys:
+            require_a_key(settings.data_dir, settings.host)
         stations = read_stations(settings.stations)
         self.store = Store(settings.data_dir, settled_elsewhere=STATION_KINDS)
+        self.audit = AuditLog(settings.data_dir)
+        ring = KeyRing(settings.data_dir, self.store.sign_ins)
+        self.keys = ring if settings.asks_for_keys else None
         self.engine = engine or ProcessEngine(settings.cancel_grace_s)
         self.notifier = Notifier()
         self.cancels = Cancels(self.store, self.notifier)
@@ -66,6 +73,7 @@ class Service:
     def close(self) -> None:
         """Let go of the store."""
         self.store.close()
+        self.audit.close()
 
 
 def the_service(request: Request) -> Service:

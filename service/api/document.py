@@ -9,7 +9,9 @@ from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 from pydantic import AwareDatetime, BaseModel
 
+from service.api.door import COOKIE
 from service.api.models import Problem, problems
+from service.api.scopes import OPEN, needed_scope
 from service.kinds.base import Model
 from service.kinds.examples import body_examples
 from service.store.tables import JobStatus
@@ -19,6 +21,23 @@ EVENTS = ("pending", "running", "progress", "completed", "failed", "cancelled", 
 """What a job's stream tells; the last four end it."""
 
 _REF = "#/components/schemas/{model}"
+
+
+_SCHEMES: Json = {
+    "key": {
+        "type": "http",
+        "scheme": "bearer",
+        "description": "What `rigwright keys add` showed. A service that listens on 127.0.0.1 "
+        "alone asks for none.",
+    },
+    "signIn": {
+        "type": "apiKey",
+        "in": "cookie",
+        "name": COOKIE,
+        "description": "A browser's sign-in; changes something only together with `Origin` and "
+        "`X-Rigwright`.",
+    },
+}
 
 
 class JobEventData(Model):
@@ -49,8 +68,10 @@ def openapi(app: FastAPI) -> Json:
             _add_schema(schemas, model)
         _drop_the_framework_errors(document)
         examples = body_examples()
+        document["components"]["securitySchemes"] = _SCHEMES
         for _, method, operation in _operations(document):
             _add_the_answers_of_the_gate(method, operation)
+            _add_the_scope(method, operation)
             _add_headers(method, operation)
             _add_links(document, method, operation)
             _add_example(operation, examples)
@@ -73,9 +94,20 @@ def _add_schema(schemas: Json, model: type[BaseModel]) -> None:
 
 
 def _add_the_answers_of_the_gate(method: str, operation: Json) -> None:
-    statuses = (403, 408, 413, 415, 421, 503) if method != "get" else (421, 503)
+    statuses = [401, 421, 429, 503]
+    if method != "get":
+        statuses += [403, 408, 413, 415]
     for status, answer in problems(*statuses).items():
         operation["responses"].setdefault(str(status), answer)
+
+
+def _add_the_scope(method: str, operation: Json) -> None:
+    if operation["operationId"] in OPEN:
+        operation["security"] = []
+        return
+    # A scheme that is not OAuth has roles here (OpenAPI 3.1); the empty one: on 127.0.0.1.
+    role = [needed_scope(method.upper(), operation["operationId"]).value]
+    operation["security"] = [{}, {"key": role}, {"signIn": role}]
 
 
 def _add_headers(method: str, operation: Json) -> None:

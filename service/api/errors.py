@@ -19,6 +19,7 @@ from service.logs import log
 from service.problems import HTTP_ERRORS, MEDIA_TYPE, problem_document, status_of
 
 _RETRY_AFTER_S = "5"
+_GUESSER_WAITS_S = "60"
 
 
 class Refusal(HTTPException):
@@ -47,7 +48,11 @@ def answer(error: RigwrightError, **more: object) -> JSONResponse:
     )
     if response.status_code == 503:
         response.headers["Retry-After"] = _RETRY_AFTER_S
-    if response.status_code in (403, 408, 413, 415, 421):
+    if response.status_code == 401:
+        response.headers["WWW-Authenticate"] = 'Bearer realm="rigwright"'
+    if response.status_code == 429:
+        response.headers["Retry-After"] = _GUESSER_WAITS_S
+    if response.status_code in (401, 403, 408, 413, 415, 421, 429):
         # The rest of the body is not read, so nothing else can come on this connection.
         response.headers["Connection"] = "close"
     return response

@@ -1,11 +1,10 @@
 """Who may ask: nothing that a foreign web page in the lab's browser can send changes anything.
 
-The service knows no accounts; that it answers this machine only, or one network, would be no
-protection where a page that somebody visits can have the browser ask. Three doors are shut: a
-foreign name that was pointed at this address (the ``Host`` header tells), a page of another
-origin (``Origin`` tells), and requests that a browser sends for any page without asking first
-(a form, or text): what changes something must be JSON, a file's own media type, or carry the
-header ``X-Rigwright``.
+That the service answers this machine only, or whoever has a key, would be no protection where a
+page that somebody visits can have the browser ask. Three doors are shut: a foreign name that was
+pointed at this address (the ``Host`` header tells), a page of another origin (``Origin`` tells),
+and requests that a browser sends for any page without asking first (a form, or text): what changes
+something must be JSON, a file's own media type, or carry the header ``X-Rigwright``.
 """
 
 from __future__ import annotations
@@ -65,7 +64,7 @@ class Gate:
 
         async def send_protected(message: Message) -> None:
             if message["type"] == "http.response.start":
-                _protect(MutableHeaders(scope=message))
+                _protect(MutableHeaders(scope=message), unchanged=message["status"] == 304)
             await send(message)
 
         refusal = self._refusal(scope["method"], own_path(scope), Headers(scope=scope))
@@ -151,9 +150,13 @@ def _short(given: str) -> str:
     return repr(given[:80])
 
 
-def _protect(headers: MutableHeaders) -> None:
+def _protect(headers: MutableHeaders, *, unchanged: bool) -> None:
     for name, value in _PROTECTIVE.items():
         headers.setdefault(name, value)
+    if unchanged:
+        # A browser takes what is here in place of what it has kept, and of what kind that is only
+        # the first answer told.
+        return
     page = headers.get("content-type", "").startswith("text/html")
     headers.setdefault("Content-Security-Policy", _PAGES if page else _NO_CONTENT_RUNS)
     headers.setdefault("Cache-Control", "no-cache")

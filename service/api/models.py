@@ -114,13 +114,16 @@ def problems(*statuses: int) -> Responses:
 
 _MEANING = {
     400: "The request is not well formed.",
-    403: "A web page of another origin, or one that did not have to ask, may not change anything.",
+    401: "A key is needed, and none came, or none that is valid.",
+    403: "The key may not do this; or a web page of another origin, or one that did not have to "
+    "ask, wants to change something.",
     404: "There is no such thing.",
     408: "The body did not come in time.",
     409: "Not possible in the present state.",
     413: "What was sent is too large.",
     415: "This media type is not accepted.",
     421: "The service is not called by this name.",
+    429: "Too many wrong keys came from this address.",
     423: "The interlock is open: nothing may fire.",
     422: "What was sent cannot be used; the detail says what to change.",
     503: "A device is missing, too much work is waiting, or the service is stopping; try again "

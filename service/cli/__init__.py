@@ -23,6 +23,7 @@ from service.cli.commands.design import design
 from service.cli.commands.evaluate import evaluate
 from service.cli.commands.export import export
 from service.cli.commands.fake_trigger import fake_trigger
+from service.cli.commands.keys import keys
 from service.cli.commands.plan import plan
 from service.cli.commands.practice import practice
 from service.cli.commands.reconstruct import reconstruct
@@ -71,7 +72,7 @@ for command in (
     *(practice, capture, cameras, fake_trigger, serve),
 ):
     app.command(command.__name__.replace("_", "-"))(command)
-for group in (rig, trigger, sessions):
+for group in (rig, trigger, sessions, keys):
     app.add_typer(group)
 
 

@@ -43,6 +43,7 @@ def body_examples() -> Mapping[str, Any]:
         },
         "add_capture": {"capture_id": "anna-001", "session": "anna"},
         "add_rig_test": {"test": "self-test"},
+        "sign_in": {"key": "rw_what-keys-add-showed"},
     }
 
 

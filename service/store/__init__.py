@@ -23,11 +23,13 @@ from service.store.documents import Documents
 from service.store.jobs import Jobs
 from service.store.lock import FolderLock
 from service.store.scans import Scans
+from service.store.signins import SignIns
 from service.store.tables import identity, utc_now
 
 DATABASE_NAME = "rigwright.sqlite3"
-_BEFORE_THE_DATABASE = {"lock", "lost+found"}
-"""A start that was cut short left a lock; a disk of its own has a folder for what is found."""
+_BEFORE_THE_DATABASE = {"lock", "lost+found", "keys.json"}
+"""A start that was cut short left a lock; a disk of its own has a folder for what is found; keys
+are made before a service starts that others can reach."""
 
 
 def interrupted() -> InternalError:
@@ -50,7 +52,7 @@ class Store:
         self.folder = folder
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            _refuse_foreign(folder)
+            refuse_foreign(folder)
             self._lock = FolderLock(folder)
         except OSError as error:
             raise InputError(
@@ -72,6 +74,7 @@ class Store:
         self.scans = Scans(self.database, self.files)
         self.documents = Documents(self.database, self.files)
         self.jobs = Jobs(self.database, self.files)
+        self.sign_ins = SignIns(self.database)
         self.service_uuid = self.database.write(_identify)
         self._work = folder / "work"
         self._recover(settled_elsewhere)
@@ -101,8 +104,11 @@ class Store:
         self.files.sweep(self.database.read(known_files))
 
 
-def _refuse_foreign(folder: Path) -> None:
-    """Keep away from folders with anybody's files: some names below are emptied at each start."""
+def refuse_foreign(folder: Path) -> None:
+    """Keep away from folders with anybody's files: some names below are emptied at each start.
+
+    Raises :class:`InputError` where ``folder`` holds any.
+    """
     names = {path.name for path in folder.iterdir()} - _BEFORE_THE_DATABASE
     if names and not (folder / DATABASE_NAME).is_file():
         raise InputError(

@@ -37,7 +37,12 @@ class JobStatus(StrEnum):
 
 def utc_now() -> str:
     """The present time as the store writes it: ISO 8601, UTC, with offset."""
-    return datetime.now(UTC).isoformat(timespec="milliseconds")
+    return time_text(datetime.now(UTC))
+
+
+def time_text(time: datetime) -> str:
+    """A time of UTC as the store writes it; texts are in the order of their times."""
+    return time.isoformat(timespec="milliseconds")
 
 
 metadata = MetaData(
@@ -145,6 +150,14 @@ documents = Table(
     Column("created_at", String, nullable=False),
     Index("ix_documents_kind_seq", "kind", "seq"),
     sqlite_autoincrement=True,
+)
+
+sign_ins = Table(
+    "sign_ins",
+    metadata,
+    Column("sha256", String, primary_key=True),
+    Column("key_sha256", String, nullable=False),
+    Column("ends_at", String, nullable=False),
 )
 
 idempotency = Table(

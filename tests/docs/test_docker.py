@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+from service.settings import Settings
+
 ROOT = Path(__file__).resolve().parents[2]
 IMAGE = (ROOT / "Dockerfile").read_text(encoding="utf-8")
 COMPOSE = (ROOT / "docker-compose.yml").read_text(encoding="utf-8")
@@ -28,6 +30,13 @@ def test_no_port_is_open_to_the_network() -> None:
     ports = re.findall(r'^\s*- "?([^"\n]+)', block, re.MULTILINE)
     assert ports and all(port.startswith("127.0.0.1:") for port in ports)
     assert "network_mode" not in COMPOSE and "privileged" not in COMPOSE
+
+
+def test_nobody_reaches_it_without_a_key() -> None:
+    # What is published, to whomever, comes from an address at which the service asks for keys.
+    (host,) = re.findall(r"RIGWRIGHT_HOST=(\S+)", IMAGE)
+    assert Settings(host=host).asks_for_keys
+    assert "RIGWRIGHT_HOST" not in COMPOSE and "--host" not in IMAGE + COMPOSE
 
 
 def test_it_has_a_user_and_an_end_to_its_memory() -> None:

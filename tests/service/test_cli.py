@@ -22,6 +22,8 @@ from common.files.folders import new_folder
 from common.files.ownership import files_of
 from service.cli.running import one_line_errors, run_task
 from service.jobs.process import ProcessEngine
+from service.keys.keyfile import add_key
+from service.keys.scope import Scope
 
 
 def cpu_s(*command: str) -> float:
@@ -62,6 +64,12 @@ def test_every_command_shows_an_example(command: str) -> None:
     assert f"Example:  rigwright {command}" in done.stdout
 
 
+def test_an_address_that_is_none_is_named(tmp_path: Path) -> None:
+    add_key(tmp_path, "anna", Scope.HARDWARE, None)
+    done = rigwright_here("serve", "--host", "not-an-address", "--data", tmp_path, cwd=tmp_path)
+    assert done.returncode == 2 and "cannot listen on not-an-address" in done.stderr
+
+
 def test_the_version() -> None:
     assert re.match(r"^rigwright \S+\n$", rigwright("--version").stdout)
 
@@ -91,7 +99,7 @@ def test_the_version() -> None:
         (["serve", "--data", "here.glb"], "the data folder here.glb cannot be used"),
         (
             ["serve", "--host", "not-an-address", "--data", "data"],
-            "cannot listen on not-an-address",
+            "there is no valid key",
         ),
     ],
 )

@@ -103,6 +103,15 @@ def test_every_answer_is_protected(client: TestClient) -> None:
     assert (slash.status_code, slash.headers.get("Location")) == (404, None)
 
 
+def test_an_unchanged_page_may_still_do_what_it_did(client: TestClient) -> None:
+    # A browser takes the headers of a 304 in place of those that it has kept.
+    first = client.get("/")
+    again = client.get("/", headers={"If-None-Match": first.headers["etag"]})
+    assert again.status_code == 304
+    policy = first.headers["Content-Security-Policy"]
+    assert again.headers.get("Content-Security-Policy", policy) == policy
+
+
 @pytest.mark.parametrize("given", ["application/json", "application/problem+json"])
 def test_no_body_is_larger_than_allowed(client: TestClient, given: str) -> None:
     piece = b" " * (1 << 20)

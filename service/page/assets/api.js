@@ -37,6 +37,11 @@ async function ask(path, given) {
   return answered(response);
 }
 
+/** Show a key, for which this browser gets a cookie. */
+export function signIn(key) {
+  return post("/v1/sign-in", { key });
+}
+
 /** Read a document. */
 export function get(path, signal) {
   return ask(path, { signal });

@@ -1,6 +1,7 @@
 // The page as a whole: which view is shown, and how the service is.
 
-import { every, get } from "./api.js";
+import { every, get, remove } from "./api.js";
+import { asked } from "./signin.js";
 import { fill, h, problem } from "./dom.js";
 import { build } from "./build.js";
 import { calibration } from "./calibration.js";
@@ -10,6 +11,7 @@ import { sessions } from "./sessions.js";
 
 const VIEWS = { rig, sessions, calibration, design, build };
 let leave = new AbortController();
+let asking = false;
 
 async function show() {
   leave.abort();
@@ -26,11 +28,41 @@ async function show() {
   try {
     await view(root, more, signal);
   } catch (error) {
-    if (!signal.aborted) root.append(problem(error));
+    if (error.status === 401) await askForKey();
+    else if (!signal.aborted) root.append(problem(error));
   }
 }
 
+/** In place of whatever was shown: what is behind the door asks for a key. */
+async function askForKey() {
+  if (asking) return;
+  asking = true;
+  leave.abort();
+  fill(document.getElementById("who"));
+  await asked(document.getElementById("content"));
+  asking = false;
+  await who();
+  show();
+}
+
+/** Who is signed in, where the service asks for keys. */
+async function who() {
+  const place = document.getElementById("who");
+  const { name, scope } = await get("/v1/sign-in").catch(() => ({ name: null, scope: "" }));
+  if (scope === null) {
+    askForKey();
+    return false;
+  }
+  const out = async () => {
+    await remove("/v1/sign-in").catch(() => {});
+    askForKey();
+  };
+  fill(place, name ? [`${name} (${scope}) `, h("button", { type: "button", class: "quiet", onclick: out }, "Sign out")] : null);
+  return true;
+}
+
 async function look(signal) {
+  if (asking) return; // nobody is told anything before
   const told = document.getElementById("service");
   let words;
   let state;
@@ -40,15 +72,16 @@ async function look(signal) {
     const work = health.jobs_running + health.jobs_pending;
     state = faults.length ? "warn" : "good";
     words = faults.length ? `${faults[0][0]}: ${faults[0][1].reason}` : work ? `${work} at work` : "ready";
-  } catch {
+  } catch (error) {
     state = "bad";
-    words = "The service does not answer; trying again";
+    words = error.status === 401 ? "Not signed in" : "The service does not answer; trying again";
+    if (error.status === 401) askForKey();
   }
   if (told.textContent !== words) told.textContent = words;
   told.className = state;
 }
 
-window.addEventListener("hashchange", show);
+window.addEventListener("hashchange", () => { if (!asking) show(); });
 const always = new AbortController().signal;
+if (await who()) show();
 every(3000, always, () => look(always));
-show();

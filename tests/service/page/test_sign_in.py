@@ -1,0 +1,47 @@
+"""The door of the page, in a real browser: a key, what it may do, and the way out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from browsers import chromium
+from page_visits import Visit, served
+from stations import write_station
+
+from service.keys.keyfile import add_key, revoke_key
+from service.keys.scope import Scope
+
+pytestmark = [pytest.mark.needs_browser, pytest.mark.slow]
+
+
+def test_who_has_a_key_comes_in_and_may_what_it_says(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("RIGWRIGHT_REQUIRE_KEYS", "true")
+    data = tmp_path / "data"
+    data.mkdir()
+    _, token = add_key(data, "anna", Scope.READ, None)
+    with served(data, write_station(tmp_path / "rig")) as address, chromium() as browser:
+        one = Visit(browser, address, 820)
+        one.see("Your key")
+        one.sound()
+        one.page.get_by_label("Your key").fill(token)
+        one.press("Sign in")
+        one.see("anna (read)")
+        one.see("Trigger box: ready")
+        one.sound()
+        one.page.reload()
+        one.see("anna (read)")
+        one.press("Abort: all outputs off")
+        one.press("Fire")
+        one.see("this needs hardware")
+        one.faults.clear()  # the browser tells of every refusal on its console
+        one.press("Sign out")
+        one.see("Your key")
+        assert one.page.get_by_text("Trigger box").count() == 0
+        one.page.get_by_label("Your key").fill(token)
+        one.press("Sign in")
+        one.see("Trigger box: ready")
+        revoke_key(data, "anna")
+        one.see("Your key")
