@@ -1,6 +1,6 @@
 """Designs for 4 to 9 cameras on a head, beside their start and the best strip.
 
-    python -m benchmarks.faces [--scan HEAD.glb] [--starts 8]
+    python -m benchmarks.faces [--scan HEAD.glb] [--starts 8] [--strategy exchange] [--counts 5 7]
         [--out docs/explanation/face-designs.md]
 
 Without a scan the bundled head is used. The limits are those of the example face rig.
@@ -21,6 +21,7 @@ from rig.specification.examples import example_rig
 from solver.design import best_strip, design
 from solver.quality import evaluate
 from solver.result import Design, Quality
+from solver.strategy import Strategy
 
 COUNTS = (4, 5, 6, 7, 8, 9)
 
@@ -59,6 +60,8 @@ def main() -> None:
     )
     parser.add_argument("--scan", type=Path, help="a head scan; the bundled head without it")
     parser.add_argument("--starts", type=int, default=8)
+    parser.add_argument("--strategy", type=Strategy, choices=Strategy, default=Strategy.K_MEANS)
+    parser.add_argument("--counts", type=int, nargs="+", default=COUNTS, metavar="N")
     parser.add_argument("--out", type=Path, help="write the table to this file")
     chosen = parser.parse_args()
     spec = example_rig("face")
@@ -69,10 +72,10 @@ def main() -> None:
         "| 2+ views | 3+ views | in frame | in focus | notes |",
         "|---|---|---|---|---|---|---|---|---|---|---|",
     ]  # fmt: skip
-    for count in COUNTS:
+    for count in chosen.counts:
         found = design(
             prepared.subject, spec.camera, spec.limits, count=count, seed=spec.seed,
-            starts=chosen.starts, workers=os.cpu_count() or 1,
+            starts=chosen.starts, workers=os.cpu_count() or 1, strategy=chosen.strategy,
         )  # fmt: skip
         names = tuple(c.name for c in found.cameras)
         strip = best_strip(prepared.subject, spec.camera, spec.limits, names)
@@ -84,7 +87,8 @@ def main() -> None:
         name = "the bundled head" if chosen.scan is None else chosen.scan.name
         head = (
             "# Designs for 4 to 9 cameras\n\n"
-            f"Head: {name}. Limits: `rig/specification/data/face.toml`, {chosen.starts} starts. "
+            f"Head: {name}. Limits: `rig/specification/data/face.toml`, {chosen.starts} starts, "
+            f"strategy {chosen.strategy}. "
             f"{len(prepared.subject.check_points)} check points.\n"
             "Written by `python -m benchmarks.faces --scan HEAD "
             "--out docs/explanation/face-designs.md`.\n"
