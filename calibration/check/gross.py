@@ -11,6 +11,7 @@ from scipy.optimize import linear_sum_assignment
 from calibration.check.agreement import agreeing
 from calibration.check.consensus import Consensus, by_camera, consensus, misfit_px
 from calibration.check.epoch import Epoch
+from calibration.check.folders import folders_by_resection
 from calibration.check.pictures import strange_pictures
 from calibration.check.verdicts import Finding
 from common.errors import InputError
@@ -82,8 +83,10 @@ def _assignment(epoch: Epoch, start: Consensus) -> Ints:
     assigned = np.arange(count)
     cost, bad = _judged(epoch, start)
     if 2 * bad.sum() > count > 2:
-        # Folders in the opposite order, or all one further: pair by pair that would not be found.
-        for tried in (assigned[::-1], np.roll(assigned, 1), np.roll(assigned, -1)):
+        # Folders in quite another order: pair by pair that would not be found.
+        resected = folders_by_resection(epoch)
+        guesses = [assigned[::-1], np.roll(assigned, 1), np.roll(assigned, -1)]
+        for tried in guesses if resected is None else [resected, *guesses]:
             other, other_bad = _judged(epoch, consensus(epoch, tried))
             if other < GAIN * cost:
                 cost, bad, assigned = other, other_bad, tried.copy()

@@ -182,7 +182,7 @@ def test_a_folder_in_the_opposite_order() -> None:
     first(result, Kind.UNSYNCHRONISED, {"cam4"}, "opposite order", Light.RED)
 
 
-@pytest.mark.parametrize("order", [(4, 3, 2, 1, 0), (1, 2, 3, 4, 0)])
+@pytest.mark.parametrize("order", [(4, 3, 2, 1, 0), (1, 2, 3, 4, 0), (2, 4, 1, 0, 3)])
 def test_all_folders_in_another_order(order: tuple[int, ...]) -> None:
     cameras = tuple(
         replace(SCENE.cameras[k], name=own.name)
