@@ -13,6 +13,7 @@ _STOPS = (
     *("abort_rig", "cancel_capture", "cancel_rig_test"),
     *("cancel_design", "cancel_plan", "cancel_evaluation"),
     *("cancel_calibration", "cancel_check", "cancel_acceptance"),
+    *("cancel_reconstruction", "cancel_comparison"),
 )
 """Whoever sees that something goes wrong may stop it."""
 
@@ -23,6 +24,7 @@ _CONFIGURES = (
     *("add_plan", "remove_plan", "add_evaluation", "remove_evaluation"),
     *("add_calibration", "remove_calibration", "add_check", "remove_check"),
     *("add_acceptance", "remove_acceptance", "remove_capture", "remove_rig_test"),
+    *("add_reconstruction", "remove_reconstruction", "add_comparison", "remove_comparison"),
 )
 _FIRES = ("add_capture", "add_rig_test", "reset_rig")
 

@@ -12,6 +12,7 @@ import typer
 
 from common.threads import ONE_BLAS_THREAD
 from service.cli.commands.accept import accept
+from service.cli.commands.backup import backup, restore
 from service.cli.commands.calibrate import calibrate
 from service.cli.commands.cameras import cameras
 from service.cli.commands.capture import capture
@@ -69,7 +70,7 @@ for command in (
     *(demo, scan, design, evaluate, plan, catalogue, export),
     *(targets, calibrate, check, accept),
     *(reconstruct, compare),
-    *(practice, capture, cameras, fake_trigger, serve),
+    *(practice, capture, cameras, fake_trigger, serve, backup, restore),
 ):
     app.command(command.__name__.replace("_", "-"))(command)
 for group in (rig, trigger, sessions, keys):

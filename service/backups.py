@@ -1,0 +1,231 @@
+"""The data folder in one file, and back: a backup is of one moment, while the service runs on."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+import secrets
+import shutil
+import sqlite3
+import tempfile
+import zipfile
+import zlib
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import AwareDatetime, Field
+
+from common.errors import ConflictError, InputError, RigwrightError
+from common.files.strict import StrictModel, parsed
+from common.version import program_version
+from service.keys import audit, keyfile
+from service.stations.filed import filed_at_once
+from service.stations.registry import STATION_KINDS
+from service.store import DATABASE_NAME, Store
+from service.store.blobs import known_files
+
+SCHEMA = "rigwright.backup/1"
+_ABOUT = "backup.json"
+_TRIES = 3
+_CHUNK_BYTES = 1 << 20
+_BLOB = re.compile(r"blobs/sha256/([0-9a-f]{2})/([0-9a-f]{2})/(\1\2[0-9a-f]{60})")
+_NAMES = (
+    _BLOB,
+    re.compile(rf"{re.escape(DATABASE_NAME)}|{re.escape(keyfile.FILE_NAME)}|{_ABOUT}"),
+    re.compile(rf"{re.escape(audit.FILE_NAME)}(\.\d)?"),
+    re.compile(r"sessions/[A-Za-z0-9][A-Za-z0-9_.-]{0,63}(/(?!\.{1,2}(/|$))[^/\\\0]+)+"),
+)
+"""All that may be in a backup: nothing else is written anywhere."""
+
+
+class About(StrictModel):
+    """What a backup says of itself."""
+
+    schema_: Annotated[Literal["rigwright.backup/1"], Field(alias="schema")]
+    program: str
+    made_at: AwareDatetime
+
+
+@dataclass(frozen=True)
+class Backup:
+    """What was put into a backup, or taken out of it. ``damaged``: sessions that are not whole."""
+
+    blobs: int
+    sessions: int
+    size_bytes: int
+    damaged: tuple[str, ...] = ()
+
+
+def back_up(data: Path, sessions: Path, out: Path) -> Backup:
+    """Write the data folder and all sessions to the ZIP file ``out``; a service may run meanwhile.
+
+    Raises :class:`ConflictError` where ``out`` exists, :class:`InputError` where there is no data
+    or nothing can be written.
+    """
+    if not (data / DATABASE_NAME).is_file():
+        raise InputError(
+            "no-data", f"the folder {data} has no data of a service", "give its --data"
+        )
+    if out.exists():
+        raise ConflictError("backup-exists", f"{out} is there already", "give another name")
+    part = out.with_name(f".{out.name}.{secrets.token_hex(4)}")
+    try:
+        for attempt in range(_TRIES):
+            try:
+                made = _written(data, sessions, part)
+                break
+            except FileNotFoundError:
+                # Something was removed between the look at the database and its file.
+                part.unlink(missing_ok=True)
+                if attempt == _TRIES - 1:
+                    raise
+        part.replace(out)
+    except OSError as error:
+        raise InputError(
+            "backup-write", f"{out} cannot be written ({error})", "make room, or give another place"
+        ) from error
+    finally:
+        part.unlink(missing_ok=True)
+    return made
+
+
+def _written(data: Path, sessions: Path, part: Path) -> Backup:
+    damaged = []
+    with (
+        tempfile.TemporaryDirectory() as scratch,
+        # Subjects' pictures and the hashes of keys are in it.
+        open(part, "xb", opener=lambda path, flags: os.open(path, flags, 0o600)) as file,
+        zipfile.ZipFile(file, "w") as archive,
+    ):
+        about = {"schema": SCHEMA, "program": program_version(), "made_at": datetime.now(UTC)}
+        archive.writestr(_ABOUT, About.model_validate(about).model_dump_json(by_alias=True))
+        copy = Path(scratch) / DATABASE_NAME
+        hashes = _copied(data / DATABASE_NAME, copy)
+        archive.write(copy, DATABASE_NAME, zipfile.ZIP_DEFLATED)
+        for sha256 in hashes:
+            name = f"blobs/sha256/{sha256[:2]}/{sha256[2:4]}/{sha256}"
+            archive.write(data / name, name)
+        for path in [data / keyfile.FILE_NAME, *sorted(data.glob(f"{audit.FILE_NAME}*"))]:
+            if path.is_file():
+                archive.write(path, path.name, zipfile.ZIP_DEFLATED)
+        folders = _sessions(sessions)
+        for folder in folders:
+            try:
+                files = filed_at_once(folder)
+            except RigwrightError:
+                # Half a session is better than none; verify tells what it lacks.
+                damaged.append(folder.name)
+                files = [(_relative(p, folder), p) for p in folder.rglob("*") if p.is_file()]
+            for inner, content in files:
+                name = f"sessions/{folder.name}/{inner}"
+                if isinstance(content, bytes):
+                    archive.writestr(name, content)
+                else:
+                    archive.write(content, name)
+    return Backup(len(hashes), len(folders), part.stat().st_size, tuple(damaged))
+
+
+def _relative(path: Path, folder: Path) -> str:
+    return path.relative_to(folder).as_posix()
+
+
+def _sessions(root: Path) -> list[Path]:
+    return sorted(path.parent for path in root.glob("*/session.json"))
+
+
+def _copied(database: Path, copy: Path) -> list[str]:
+    """Copy a database of one moment; the hashes of the files that it knows."""
+    with closing(sqlite3.connect(database)) as live, closing(sqlite3.connect(copy)) as kept:
+        live.backup(kept)
+        return [row[0] for row in kept.execute("SELECT sha256 FROM blobs ORDER BY sha256")]
+
+
+def restore(backup: Path, data: Path) -> Backup:
+    """Write a backup to the empty folder ``data`` and bring it up to date; all of it is checked.
+
+    Raises :class:`ConflictError` where ``data`` holds something, :class:`InputError` where the
+    backup is not sound; then nothing is left.
+    """
+    if data.exists() and any(path.name != "lost+found" for path in data.iterdir()):
+        raise ConflictError(
+            "restore-not-empty", f"the folder {data} is not empty", "give a new one with --data"
+        )
+    with _opened(backup) as archive, _emptied_on_failure(data):
+        names = [name for name in archive.namelist() if not name.endswith("/")]
+        for name in names:
+            if not any(form.fullmatch(name) for form in _NAMES):
+                raise _unsound(backup, f"holds {name!r}")
+        parsed(About, archive.read(_ABOUT), f"{backup.name}: {_ABOUT}")
+        # Last of all: before there is a database no service takes the folder for its own.
+        for name in sorted(names, key=lambda name: name == DATABASE_NAME):
+            _extract(archive, name, data, backup)
+        with Store(data, settled_elsewhere=STATION_KINDS) as store:
+            known = store.database.read(known_files)
+            missing = [sha256 for sha256 in known if not store.files.path(sha256).is_file()]
+        if missing:
+            raise _unsound(backup, f"lacks {len(missing)} of its files")
+        size = sum(archive.getinfo(name).file_size for name in names)
+        return Backup(len(known), len(_sessions(data / "sessions")), size)
+
+
+@contextmanager
+def _opened(backup: Path) -> Iterator[zipfile.ZipFile]:
+    try:
+        with zipfile.ZipFile(backup) as archive:
+            if not {_ABOUT, DATABASE_NAME} <= set(archive.namelist()):
+                raise _unsound(backup, "is no backup of this program")
+            yield archive
+    except OSError as error:
+        raise InputError(
+            "restore-failed", f"{backup} cannot be restored ({error})", "check path and disk"
+        ) from error
+    except (zipfile.BadZipFile, zlib.error, EOFError) as error:
+        raise _unsound(backup, f"is damaged ({error})") from error
+
+
+def _extract(archive: zipfile.ZipFile, name: str, data: Path, backup: Path) -> None:
+    if name == _ABOUT:
+        return
+    place, digest = data / name, hashlib.sha256()
+    place.parent.mkdir(parents=True, exist_ok=True)
+    private = 0o600 if name.startswith((keyfile.FILE_NAME, audit.FILE_NAME)) else 0o666
+    with (
+        archive.open(name) as packed,
+        open(place, "xb", opener=lambda path, flags: os.open(path, flags, private)) as file,
+    ):
+        while chunk := packed.read(_CHUNK_BYTES):
+            digest.update(chunk)
+            file.write(chunk)
+        file.flush()
+        os.fsync(file.fileno())
+    blob = _BLOB.fullmatch(name)
+    if blob and blob[3] != digest.hexdigest():
+        raise _unsound(backup, f"is damaged ({name} has other content)")
+
+
+@contextmanager
+def _emptied_on_failure(data: Path) -> Iterator[None]:
+    there = data.exists()
+    data.mkdir(parents=True, exist_ok=True)
+    try:
+        yield
+    except BaseException:
+        for path in data.iterdir():
+            if path.name == "lost+found":
+                continue
+            if path.is_dir():
+                shutil.rmtree(path)
+            else:
+                path.unlink()
+        if not there:
+            data.rmdir()
+        raise
+
+
+def _unsound(backup: Path, why: str) -> InputError:
+    return InputError("backup-damaged", f"{backup} {why}", "give another backup")

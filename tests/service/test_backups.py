@@ -1,0 +1,150 @@
+"""Backup and restore, damaged ones too, and data folders in the form of older versions."""
+
+from __future__ import annotations
+
+import sqlite3
+import zipfile
+from pathlib import Path
+
+import pytest
+from alembic import command
+from alembic.config import Config
+from service_helpers import files_under, rigwright_here
+from sqlalchemy import create_engine
+from stations import write_station
+
+from common.errors import ConflictError, InputError
+from rig.acquisition.session.verify import verify_session
+from rig.acquisition.station.stationfile import read_station
+from rig.devices.station import open_station
+from service.backups import back_up, restore
+from service.keys.keyfile import add_key, read_keys
+from service.keys.scope import Scope
+from service.store import DATABASE_NAME, Store
+from service.store.jobrecords import NewJob
+from service.store.scans import scan_identity
+
+
+def filled(data: Path) -> Store:
+    """A store with a scan and a job, and a key beside it."""
+    store = Store(data)
+    add_key(data, "anna", Scope.READ, None)
+    with store.files.stage(".glb") as staging:
+        staging.write(b"a head")
+        staged = staging.finish()
+        store.scans.add(
+            staged,
+            scan_id=scan_identity(staged.sha256, ".glb", {}),
+            filename="head.glb",
+            media_type="model/gltf-binary",
+            options={},
+            report={"vertices": 3, "faces": 1, "extents_mm": [1.0, 2.0, 3.0], "notes": []},
+        )
+    store.jobs.create(NewJob("count", {"to": 1}), max_pending=10)
+    return store
+
+
+def known(store: Store) -> tuple[str, list[str], list[str]]:
+    scans = [scan.id for scan in store.scans.page(10, None)]
+    return store.service_uuid, scans, [job.id for job in store.jobs.page("count", 10, None)]
+
+
+@pytest.fixture
+def backup(tmp_path: Path) -> Path:
+    data = tmp_path / "data"
+    filled(data).close()
+    back_up(data, data / "sessions", tmp_path / "b.zip")
+    return tmp_path / "b.zip"
+
+
+def test_what_is_restored_is_what_was_there_while_it_ran(tmp_path: Path) -> None:
+    with filled(tmp_path / "data") as store:
+        done = rigwright_here("backup", "b.zip", "--data", "data", cwd=tmp_path)
+        assert done.returncode == 0 and done.stdout.startswith("b.zip: 1 files and 0 sessions")
+        before = known(store)
+    assert (tmp_path / "b.zip").stat().st_mode & 0o077 == 0
+    done = rigwright_here("restore", "b.zip", "--data", "new", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    with Store(tmp_path / "new") as again:
+        assert known(again) == before
+        assert again.scans.path(again.scans.get(before[1][0])).read_bytes() == b"a head"
+    assert [key.name for key in read_keys(tmp_path / "new")] == ["anna"]
+    assert (tmp_path / "new" / "keys.json").stat().st_mode & 0o777 == 0o600
+
+
+def test_sessions_come_along_whole_or_as_they_are(tmp_path: Path) -> None:
+    data = tmp_path / "data"
+    filled(data).close()
+    sessions = data / "sessions"
+    sessions.mkdir()
+    with (
+        open_station(read_station(write_station(tmp_path / "rig"))) as rig,
+        rig.new_session(sessions / "anna", "anna", "") as session,
+    ):
+        rig.capture(session, "one")
+    (sessions / "bert").mkdir()
+    (sessions / "bert" / "session.json").write_text("broken")
+    made = back_up(data, sessions, tmp_path / "b.zip")
+    assert (made.sessions, made.damaged) == (2, ("bert",))
+    restore(tmp_path / "b.zip", tmp_path / "new")
+    assert verify_session(tmp_path / "new" / "sessions" / "anna").whole
+    assert (tmp_path / "new" / "sessions" / "bert" / "session.json").read_text() == "broken"
+
+
+def test_nothing_is_replaced(tmp_path: Path, backup: Path) -> None:
+    with pytest.raises(ConflictError, match="there already"):
+        back_up(tmp_path / "data", tmp_path / "data" / "sessions", backup)
+    with pytest.raises(ConflictError, match="not empty"):
+        restore(backup, tmp_path / "data")
+    with pytest.raises(InputError, match="no data of a service"):
+        back_up(tmp_path, tmp_path, tmp_path / "other.zip")
+
+
+@pytest.mark.parametrize("fault", ["cut", "content", "blob", "stranger", "outside", "no zip"])
+def test_an_unsound_backup_leaves_nothing(tmp_path: Path, backup: Path, fault: str) -> None:
+    bad = tmp_path / "bad.zip"
+    if fault in ("cut", "content", "no zip"):
+        raw = backup.read_bytes()
+        # The head's own letters lie uncompressed in it.
+        changed = {"cut": raw[:-300], "content": raw.replace(b"a head", b"a hand"), "no zip": b"x"}
+        bad.write_bytes(changed[fault])
+    else:
+        with zipfile.ZipFile(backup) as old, zipfile.ZipFile(bad, "w") as new:
+            for name in old.namelist():
+                if fault == "blob" and name.startswith("blobs/"):
+                    continue
+                new.writestr(name, old.read(name))
+            if fault in ("stranger", "outside"):
+                new.writestr({"stranger": "setup.py", "outside": "sessions/a/../../x"}[fault], "x")
+    before = files_under(tmp_path)
+    with pytest.raises(InputError):
+        restore(bad, tmp_path / "new")
+    assert files_under(tmp_path) == before and not (tmp_path / "new").exists()
+
+
+@pytest.mark.parametrize("revision", ["0001", "0002"])
+def test_a_folder_of_an_older_version_is_brought_up_to_date(tmp_path: Path, revision: str) -> None:
+    data = tmp_path / "data"
+    data.mkdir()
+    config = Config()
+    config.set_main_option("script_location", "service.store:migrations")
+    engine = create_engine(f"sqlite:///{data / DATABASE_NAME}")
+    with engine.begin() as connection:
+        config.attributes["connection"] = connection
+        command.upgrade(config, revision)
+    engine.dispose()
+    connection = sqlite3.connect(data / DATABASE_NAME)
+    connection.execute("INSERT INTO identity VALUES (1, 'as-before', '2026-01-31T12:00:00+00:00')")
+    connection.execute(
+        "INSERT INTO jobs (id, kind, status, request, cancel_requested, created_at)"
+        " VALUES ('old', 'count', 'pending', '{\"to\": 1}', 0, '2026-01-31T12:00:00.000+00:00')"
+    )
+    connection.commit()
+    connection.close()
+    # An older folder can be backed up before the newer program has touched it.
+    back_up(data, data / "sessions", tmp_path / "old.zip")
+    restore(tmp_path / "old.zip", tmp_path / "new")
+    for folder in (data, tmp_path / "new"):
+        with Store(folder) as store:
+            assert known(store) == ("as-before", [], ["old"])
+            assert store.sign_ins.get("nobody") is None
