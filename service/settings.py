@@ -95,6 +95,9 @@ class Settings(BaseSettings):
     scan_memory_limit_bytes: Annotated[
         int, Field(ge=1 << 29, description="Address space for reading an uploaded scan.")
     ] = 8 << 30
+    surface_memory_limit_bytes: Annotated[
+        int, Field(ge=1 << 30, description="Address space of a reconstruction or comparison.")
+    ] = 16 << 30
 
     @field_validator("stations", mode="before")
     @classmethod

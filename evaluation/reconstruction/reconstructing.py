@@ -39,7 +39,7 @@ from evaluation.reconstruction.depthmaps import (
 from evaluation.reconstruction.fusion import FusedPoints, best_references, fused
 from evaluation.reconstruction.neighbours import on_surface
 from evaluation.reconstruction.pairs import companions, partners, ray_angles_deg
-from evaluation.reconstruction.views import View
+from evaluation.reconstruction.views import View, memory_told
 from evaluation.reconstruction.volume import Volume, common_volume
 from geometry.arrays import Bools, Floats
 
@@ -119,19 +119,29 @@ def reconstruct(
     :class:`InputError` where fewer than two cameras can work together, or nothing matches;
     :class:`CancelledError` when told to stop.
     """
-    report = _Reporter(progress, cancel or NeverCancelled())
-    network = _network(views, volume or common_volume(views), options)
-    halves = [_half_map(network, k, options, report) for k in range(len(views))]
+    with memory_told():
+        return _reconstructed(
+            _network(views, volume or common_volume(views), options),
+            options,
+            _Reporter(progress, cancel or NeverCancelled()),
+        )
+
+
+def _reconstructed(
+    network: _Network, options: ReconstructionOptions, report: _Reporter
+) -> Reconstruction:
+    count = len(network.full)
+    halves = [_half_map(network, k, options, report) for k in range(count)]
     best = best_references(halves, options.references)
     fulls, tried = [], []
-    for k in range(len(views)):
-        report.step("full", k, len(views))
-        map_, count = _full_map(network, k, halves[k], best[k], options)
+    for k in range(count):
+        report.step("full", k, count)
+        map_, number = _full_map(network, k, halves[k], best[k], options)
         fulls.append(map_)
-        tried.append(count)
+        tried.append(number)
     parts = []
-    for k in range(len(views)):
-        report.step("fusion", k, len(views))
+    for k in range(count):
+        report.step("fusion", k, count)
         parts.append(_inside(fused(fulls, k), network.volume))
     report.step("surface", 0, 1)
     return _result(network, fulls, parts, tried, options)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -64,6 +66,17 @@ class View:
             self.pose,
             clipped,
         )
+
+
+@contextmanager
+def memory_told() -> Iterator[None]:
+    """OpenCV's own complaint about too little memory as Python's :class:`MemoryError`."""
+    try:
+        yield
+    except cv2.error as error:
+        if error.code == cv2.Error.StsNoMem:
+            raise MemoryError from error
+        raise
 
 
 def view_of(image: Coded, camera: RigCamera) -> View:

@@ -14,6 +14,7 @@ from service.api import (
     calibrations,
     captures,
     checks,
+    comparisons,
     designs,
     document,
     evaluations,
@@ -23,6 +24,7 @@ from service.api import (
     metrics,
     picturesets,
     plans,
+    reconstructions,
     rigs,
     rigtests,
     root,
@@ -72,6 +74,7 @@ def make_app() -> FastAPI:
         *(root, signin, health, metrics, scans, examples, designs, exports, plans, evaluations),
         *(rigs, captures, rigtests, sessions),
         *(targetsets, picturesets, calibrations, checks, acceptances),
+        *(reconstructions, comparisons),
     )
     app.state.routers = [module.router for module in resources]
     for router in app.state.routers:

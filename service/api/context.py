@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Annotated, Any
 
 from anyio import CapacityLimiter
@@ -18,12 +19,16 @@ from service.jobs.process import ProcessEngine
 from service.keys.audit import AuditLog
 from service.keys.ring import KeyRing, require_a_key
 from service.kinds.base import JobKind
+from service.kinds.comparison import COMPARISON
+from service.kinds.reconstruction import RECONSTRUCTION
 from service.settings import Settings
 from service.stations.registry import STATION_KINDS, StationRegistry, read_stations
 from service.stations.worker import WorkerContext
 from service.store import Store
 
 _IMPORTS_AT_ONCE = 2
+_SURFACES = (RECONSTRUCTION.name, COMPARISON.name)
+"""What grows with the pictures and clouds it is given, which nobody has measured before."""
 
 
 class Service:
@@ -46,8 +51,14 @@ class Service:
         self.engine = engine or ProcessEngine(settings.cancel_grace_s)
         self.notifier = Notifier()
         self.cancels = Cancels(self.store, self.notifier)
+        limited = {
+            name: replace(kind, memory_limit_bytes=settings.surface_memory_limit_bytes)
+            if name in _SURFACES
+            else kind
+            for name, kind in kinds.items()
+        }
         self.jobs = JobManager(
-            self.store, self.engine, kinds, self.notifier, self.cancels, settings.jobs_at_once
+            self.store, self.engine, limited, self.notifier, self.cancels, settings.jobs_at_once
         )
         context = WorkerContext(self.store, self.notifier, self.cancels)
         self.rigs = StationRegistry(stations, settings.sessions_folder, context)

@@ -24,6 +24,7 @@ _RESOURCES = (
         "checks",
         "acceptances",
     ),
+    *("reconstructions", "comparisons"),
 )
 
 

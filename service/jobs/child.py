@@ -89,7 +89,7 @@ def _outcome(find: FindWork, message: TaskMessage, running: Running) -> Result |
         return TooLargeError(
             "memory",
             "the work needs more memory than is allowed",
-            "give a smaller scan or fewer points",
+            "give smaller or fewer files, or raise the limit in the settings",
         )
     except OSError as error:
         if error.errno not in (errno.ENOSPC, errno.EDQUOT):

@@ -14,6 +14,7 @@ _SCAN = "5c0e6f2a"
 _DESIGN = "9b2d41c7"
 _TARGETS = "77ab90d3"
 _CALIBRATION = "e55f1b08"
+_RECONSTRUCTION = "0d41f77e"
 
 
 def body_examples() -> Mapping[str, Any]:
@@ -40,6 +41,14 @@ def body_examples() -> Mapping[str, Any]:
             "calibration_id": _CALIBRATION,
             "target_set_id": _TARGETS,
             "pictures": pictures,
+        },
+        "add_reconstruction": {
+            "calibration_id": _CALIBRATION,
+            "pictures": {"session": "anna", "captures": ["anna-001"]},
+        },
+        "add_comparison": {
+            "cloud": {"reconstruction_id": _RECONSTRUCTION},
+            "reference_scan_id": _SCAN,
         },
         "add_capture": {"capture_id": "anna-001", "session": "anna"},
         "add_rig_test": {"test": "self-test"},

@@ -9,10 +9,16 @@ from service.kinds.acceptance import ACCEPTANCE
 from service.kinds.base import JobKind
 from service.kinds.calibration import CALIBRATION
 from service.kinds.check import CHECK
+from service.kinds.comparison import COMPARISON
 from service.kinds.design import DESIGN
 from service.kinds.evaluation import EVALUATION
 from service.kinds.plan import PLAN
+from service.kinds.reconstruction import RECONSTRUCTION
 
-_ALL: tuple[JobKind[Any, Any], ...] = (DESIGN, EVALUATION, PLAN, CALIBRATION, CHECK, ACCEPTANCE)
+_ALL: tuple[JobKind[Any, Any], ...] = (
+    *(DESIGN, EVALUATION, PLAN),
+    *(CALIBRATION, CHECK, ACCEPTANCE),
+    *(RECONSTRUCTION, COMPARISON),
+)
 QUEUED: Mapping[str, JobKind[Any, Any]] = {kind.name: kind for kind in _ALL}
 """By name."""

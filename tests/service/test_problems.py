@@ -205,6 +205,8 @@ LIKE_DESIGNS = tuple(
         "calibrations",
         "checks",
         "acceptances",
+        "reconstructions",
+        "comparisons",
     )
 )
 """What is below these is said to be as it is below designs."""

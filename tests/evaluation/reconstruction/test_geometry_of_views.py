@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cv2
 import matching_scenes as scenes
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from evaluation.reconstruction.depthmaps import DepthMap, relations
 from evaluation.reconstruction.fusion import measured_points
 from evaluation.reconstruction.neighbours import on_surface
 from evaluation.reconstruction.pairs import companions, partners, ray_angles_deg
-from evaluation.reconstruction.views import View
+from evaluation.reconstruction.views import View, memory_told
 from evaluation.reconstruction.volume import Volume, common_volume
 
 
@@ -100,3 +101,10 @@ def test_stray_points_and_rims_go_and_the_surface_stays() -> None:
     keep = on_surface(points, normals, np.full(len(points), 0.01), 0.05)
     assert keep[:4000].mean() > 0.999
     assert not keep[4000:].any()
+
+
+def test_too_little_memory_is_told_as_such_by_opencv_too() -> None:
+    with pytest.raises(MemoryError), memory_told():
+        cv2.resize(np.zeros((4, 4), np.uint8), (1 << 30, 1 << 30))
+    with pytest.raises(cv2.error), memory_told():
+        cv2.resize(np.zeros((4, 4), np.uint8), (0, 0))
