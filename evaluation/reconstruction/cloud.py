@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from common.errors import InputError
 from geometry.arrays import Floats, frozen
 
+Bytes = NDArray[np.uint8]
+
 
 @dataclass(frozen=True, eq=False)
 class Cloud:
@@ -21,7 +23,7 @@ class Cloud:
 
     points_mm: Floats
     normals: Floats
-    colours: NDArray[np.uint8]
+    colours: Bytes
     sigma_mm: Floats
     views: NDArray[np.uint8]
 

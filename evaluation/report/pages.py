@@ -3,28 +3,45 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from importlib.resources import files
 
 import numpy as np
 from numpy.typing import NDArray
 
-from common.page.document import still_page, style_sheet
+from common.page.document import drawn_page, still_page, style_sheet
 from common.page.html import esc, section, text_table
 from evaluation.comparison.comparing import Comparison
 from evaluation.reconstruction.reconstructing import Reconstruction
+from evaluation.reconstruction.surface import SurfaceMesh
 from evaluation.report.pictures import SIDES, blue_to_red, low_to_high, png_data_uri, splat
+from evaluation.report.surfacefigure import surface_figure
 from geometry.arrays import Floats
 
 
-def reconstruction_page(done: Reconstruction, title: str, notes: Sequence[str] = ()) -> str:
-    """The cloud from three sides, in its colours and by its sigma, and what each camera gave."""
+def reconstruction_page(
+    done: Reconstruction, shown: SurfaceMesh, title: str, notes: Sequence[str] = ()
+) -> str:
+    """The surface to turn, the cloud from three sides, and what each camera gave.
+
+    ``shown`` is the surface with few enough faces for a page. Both have their colours and sigma.
+    """
     cloud = done.cloud
     scale_mm = float(np.percentile(cloud.sigma_mm, 98.0))
     rows = [[c.name, f"{c.tried:,}", f"{c.measured:,}", f"{c.points:,}"] for c in done.cameras]
     told = "".join(f"<p>{esc(note)}</p>" for note in notes)
-    body = (
-        f"<header><h1>{esc(title)}</h1><p>{len(cloud):,} points, median sigma "
+    header = (
+        f"<h1>{esc(title)}</h1><p>{len(cloud):,} points, median sigma "
         f"{np.median(cloud.sigma_mm):.3f} mm, median number of cameras "
-        f"{int(np.median(cloud.views))}.</p>{told}</header><main>"
+        f"{int(np.median(cloud.views))}.</p>{told}"
+    )
+    main = (
+        section(
+            "surface",
+            "The surface",
+            "Drag to turn, scroll to come nearer. Red lines are the rims of what was measured: "
+            "nothing is made up beyond them.",
+            '<div id="surface-3d"></div>',
+        )
         + section("colours", "The points", "", _three(cloud.points_mm, cloud.colours))
         + section(
             "sigma",
@@ -39,9 +56,18 @@ def reconstruction_page(done: Reconstruction, title: str, notes: Sequence[str] =
             "Patches tried, patches that matched, and points that the others left standing.",
             text_table(["camera", "tried", "matched", "points"], rows),
         )
-        + "</main>"
     )
-    return still_page(title, body, style_sheet() + _STYLE)
+    figure = str(surface_figure(shown, scale_mm).to_json())
+    return drawn_page(
+        title,
+        header=header,
+        main=main,
+        footer="",
+        style=style_sheet() + _STYLE,
+        figures='{"figure": ' + figure + "}",
+        script=files("evaluation.report").joinpath("surface.js").read_text(encoding="utf-8"),
+        view={"points": len(cloud), "faces": len(shown.faces)},
+    )
 
 
 def comparison_page(done: Comparison, title: str, scale_mm: float) -> str:
@@ -103,6 +129,7 @@ def _histogram(distances_mm: Floats, scale_mm: float) -> str:
 
 
 _STYLE = """
+#surface-3d { height: 70vh; min-height: 420px; }
 .sides { display: flex; flex-wrap: wrap; gap: 1rem; }
 .sides figure { margin: 0; flex: 1 1 260px; max-width: 420px; }
 .sides img { width: 100%; height: auto; border-radius: 6px; }

@@ -77,4 +77,5 @@ def add_reconstruction(
 
 resource.add_to(router)
 resource.add_shortcut(router, "cloud", "cloud.ply", "application/octet-stream")
+resource.add_shortcut(router, "mesh", "mesh.glb", "model/gltf-binary")
 resource.add_shortcut(router, "report", "report.html", "text/html")

@@ -20,6 +20,15 @@ class ReconstructionRequest(Request):
     stride_px: Annotated[
         int, Field(ge=1, le=16, description="Pixels between the points of a picture.")
     ] = 2
+    cell_mm: Annotated[
+        float | None,
+        Field(
+            ge=0.05,
+            le=50.0,
+            description="About the edge of the mesh's triangles; without it 1.5 times the spacing "
+            "of the points.",
+        ),
+    ] = None
 
 
 class CameraPart(Result):
@@ -32,7 +41,7 @@ class CameraPart(Result):
 
 
 class ReconstructionResult(Result):
-    """What was found, in short; ``cloud.ply`` holds the points."""
+    """What was found, in short; ``cloud.ply`` holds the points, ``mesh.ply`` the surface."""
 
     frame: str
     points: int
@@ -41,6 +50,8 @@ class ReconstructionResult(Result):
     centre_rig_mm: list[float]
     radius_mm: float
     cameras: list[CameraPart]
+    mesh_faces: int
+    mesh_area_mm2: float
     without_pictures: Annotated[
         list[str], Field(description="Cameras of the rig that have no picture of this instant.")
     ]

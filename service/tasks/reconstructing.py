@@ -15,11 +15,13 @@ from common.errors import InputError
 from common.progress import Progress
 from evaluation.extras import require_numba
 from evaluation.reconstruction.cloudfile import write_cloud
+from evaluation.reconstruction.meshfile import mesh_glb, mesh_ply
 from evaluation.reconstruction.reconstructing import (
     Reconstruction,
     ReconstructionOptions,
     reconstruct,
 )
+from evaluation.reconstruction.surface import SurfaceMesh, meshed
 from evaluation.reconstruction.views import View, view_of
 from evaluation.report.pages import reconstruction_page
 from geometry.camera import RigCamera
@@ -31,12 +33,17 @@ from service.tasks.seeing import taken_pictures
 
 READING = 0.1
 """Share of the progress that goes to reading the pictures."""
+MATCHING = 0.92
+"""How far it has come when the points are there."""
+
+SHOWN_FACES = 60_000
+"""A page with more turns slowly."""
 
 
 def reconstruction(
     task: Task[ReconstructionRequest, ReconstructionResult], running: Running
 ) -> ReconstructionResult:
-    """Write ``cloud.ply`` and ``report.html``.
+    """Write ``cloud.ply``, ``mesh.ply``, ``mesh.glb`` and ``report.html``.
 
     The cameras come from the input ``calibration``, or ``design`` where they are as designed.
     """
@@ -50,18 +57,31 @@ def reconstruction(
     )
 
     def within(inner: Progress, /) -> None:
-        share = READING + (0.98 - READING) * inner.fraction
+        share = READING + (MATCHING - READING) * inner.fraction
         running.report(Progress(f"matching, {inner.stage}", share))
 
     done = reconstruct(views, options=options, progress=within, cancel=running.cancel)
     missing = sorted({c.name for c in cameras} - {v.name for v in views})
+    running.report(Progress("meshing", MATCHING))
+    mesh = meshed(done.cloud, task.request.cell_mm, options.workers)
     write_cloud(task.folder / "cloud.ply", done.cloud)
+    (task.folder / "mesh.ply").write_bytes(mesh_ply(mesh))
+    (task.folder / "mesh.glb").write_bytes(mesh_glb(mesh))
+    running.report(Progress("drawing", 0.97))
     title = task.request.name or f"Reconstruction of {frame}"
     notes = [f"No picture of {', '.join(missing)}."] if missing else []
-    page = reconstruction_page(done, title, notes)
+    page = reconstruction_page(done, _shown(mesh, done, options.workers), title, notes)
     (task.folder / "report.html").write_text(page, encoding="utf-8")
     running.report(Progress("done", 1.0))
-    return _result(done, frame, missing)
+    return _result(done, mesh, frame, missing)
+
+
+def _shown(mesh: SurfaceMesh, done: Reconstruction, workers: int) -> SurfaceMesh:
+    """The mesh, or a coarser one where a page could not hold it."""
+    if len(mesh.faces) <= SHOWN_FACES:
+        return mesh
+    # Triangles of about half a cube's face: so many cubes' faces make the area.
+    return meshed(done.cloud, (2.5 * mesh.area_mm2() / SHOWN_FACES) ** 0.5, workers)
 
 
 def _cameras(inputs: Mapping[str, Path]) -> tuple[RigCamera, ...]:
@@ -106,7 +126,9 @@ def _views(
     return views
 
 
-def _result(done: Reconstruction, frame: str, missing: list[str]) -> ReconstructionResult:
+def _result(
+    done: Reconstruction, mesh: SurfaceMesh, frame: str, missing: list[str]
+) -> ReconstructionResult:
     return ReconstructionResult(
         frame=frame,
         points=len(done.cloud),
@@ -118,5 +140,7 @@ def _result(done: Reconstruction, frame: str, missing: list[str]) -> Reconstruct
             CameraPart(camera=c.name, tried=c.tried, measured=c.measured, points=c.points)
             for c in done.cameras
         ],
+        mesh_faces=len(mesh.faces),
+        mesh_area_mm2=round(mesh.area_mm2(), 1),
         without_pictures=missing,
     )

@@ -28,7 +28,9 @@ def test_the_head_is_found_where_it_was_photographed(taken: Path, tmp_path: Path
     result = json.loads(made.stdout)["result"]
     assert result["without_pictures"] == []
     assert result["points"] > 10_000
-    assert "from its left" in (tmp_path / "face" / "report.html").read_text("utf-8")
+    page = (tmp_path / "face" / "report.html").read_text("utf-8")
+    assert "from its left" in page
+    assert 'id="surface-3d"' in page
     nose = json.loads((taken / "nose.json").read_text())
     compared = run(
         "compare", tmp_path / "face" / "cloud.ply", "--truth", taken / "truth.ply",
@@ -36,6 +38,15 @@ def test_the_head_is_found_where_it_was_photographed(taken: Path, tmp_path: Path
     )  # fmt: skip
     assert compared.returncode == 0, compared.stderr
     figures = json.loads(compared.stdout)["result"]
+    surface = run(
+        "compare", tmp_path / "face" / "mesh.ply", "--truth", taken / "truth.ply",
+        "--within", *nose, "60", "--out", tmp_path / "surface", "--json",
+    )  # fmt: skip
+    smooth = json.loads(surface.stdout)["result"]
+    # Vertices are spread evenly, points are dense where they are surest: the rms of the two is not
+    # to be compared, the limit of the points holds for both.
+    assert smooth["median_absolute_mm"] < 0.23
+    assert abs(smooth["bias_mm"]) < 0.1
     # The pixel is 0.6 mm on the face and rays meet at about 15 degrees: 0.1 px of matching is
     # 0.6 x 0.1 / 0.26 = 0.23 mm. Twice that for the shadows of a small picture.
     assert figures["median_absolute_mm"] < 0.23

@@ -44,6 +44,14 @@ def reconstruct(
     stride: Annotated[
         int, typer.Option(metavar="PX", min=1, max=16, help="Pixels between points.")
     ] = 2,
+    cell: Annotated[
+        float | None,
+        typer.Option(
+            metavar="MM",
+            help="About the edge of the mesh's triangles; else by the points' spacing.",
+            show_default=False,
+        ),
+    ] = None,
     name: Annotated[str, typer.Option(help="What to call it.")] = "",
     workers: WorkersOption = None,
     as_json: JsonOption = False,
@@ -51,8 +59,8 @@ def reconstruct(
 ) -> None:
     """Reconstruct the surface that the pictures of one capture show.
 
-    Writes the points with normals, colours and sigmas (cloud.ply) and a page. Needs the extra
-    'evaluation'.
+    Writes the points with normals, colours and sigmas (cloud.ply), the surface through them
+    (mesh.ply, mesh.glb) and a page with the surface to turn. Needs the extra 'evaluation'.
 
     Exit code: 0 done, 2 bad input, 130 interrupted.
 
@@ -81,7 +89,7 @@ def reconstruct(
             inputs["calibration"] = reference_file(calibration)
         if design is not None:
             inputs["design"] = design
-        request = ReconstructionRequest(name=name, frame=frame, stride_px=stride)
+        request = ReconstructionRequest(name=name, frame=frame, stride_px=stride, cell_mm=cell)
         with new_folder(out, force=force, spare=[pictures, *inputs.values()]) as folder:
             result = run_task(RECONSTRUCTION, request, inputs, folder, source.run)
         if as_json:

@@ -19,7 +19,8 @@ def print_reconstruction(result: ReconstructionResult) -> None:
     console = Console(highlight=False)
     console.print(
         f"{result.points:,} points, median sigma {result.sigma_median_mm:.4f} mm, median of "
-        f"{result.views_median} cameras a point; cameras without a picture: {missing}",
+        f"{result.views_median} cameras a point; surface of {result.mesh_area_mm2 / 100.0:.1f} cm2 "
+        f"in {result.mesh_faces:,} triangles; cameras without a picture: {missing}",
         markup=False,
     )
 
