@@ -169,6 +169,7 @@ class Profile(Part):
     mass_kg_per_m: float | None = None
     inertia_x_mm4: float | None = None
     inertia_y_mm4: float | None = None
+    torsion_mm4: float | None = None
     elasticity_n_per_mm2: float | None = None
 
 

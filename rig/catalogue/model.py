@@ -204,6 +204,10 @@ class ProfileEntry(Entry):
     inertia_y_mm4: Positive | None = Field(
         default=None, description="The same about the axis along its height."
     )
+    torsion_mm4: Positive | None = Field(
+        default=None,
+        description="Its torsion constant; where it is not known, a fifth of the smaller inertia.",
+    )
     elasticity_n_per_mm2: Positive | None = Field(default=None, description="Young's modulus.")
 
 

@@ -89,6 +89,19 @@ class PlanCamera(Result):
     settings: list[PlanSetting]
 
 
+class PlanSag(Result):
+    """How a camera gives way under the weight of the rig, and to a touch of 5 N."""
+
+    camera: str
+    sinks_mm: Annotated[Figure, Field(description="How far its optical centre moves.")]
+    leans_deg: Figure
+    touched_mm: Figure
+    touched_deg: Figure
+    too_far: Annotated[
+        str, Field(description="Which limit it goes beyond, in words; empty where none.")
+    ]
+
+
 class PlanResult(Result):
     """A plan in short; its files hold the rest."""
 
@@ -112,6 +125,9 @@ class PlanResult(Result):
     cameras: list[PlanCamera]
     steps: Annotated[list[str], Field(description="How to put it together, in order.")]
     notes: list[str]
+    sags: list[PlanSag] = Field(
+        default_factory=list, description="How each camera gives way under the rig's own weight."
+    )
 
 
 PLAN = JobKind("plan", PlanRequest, PlanResult)

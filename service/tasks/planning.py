@@ -11,7 +11,7 @@ from geometry.reading import read_scan
 from rig.build.folder.planfiles import PlanOptions
 from rig.build.folder.planfolder import write_plan
 from rig.build.mounts.making import make_plan
-from rig.build.mounts.plan import Clash, Figures, MountPlan, Price, Tolerance
+from rig.build.mounts.plan import Clash, Figures, MountPlan, Price, Sag, Tolerance
 from rig.build.mounts.settings import CameraMount
 from rig.build.parts import Prices, must_be_known
 from rig.catalogue import load_catalogue
@@ -24,6 +24,7 @@ from service.kinds.plan import (
     PlanPrice,
     PlanRequest,
     PlanResult,
+    PlanSag,
     PlanSetting,
     PlanTolerance,
 )
@@ -91,6 +92,18 @@ def _result(made: MountPlan) -> PlanResult:
         cameras=[_camera(mount) for mount in made.mounts],
         steps=list(made.steps),
         notes=list(made.notes),
+        sags=[_sag(sag) for sag in made.sags],
+    )
+
+
+def _sag(sag: Sag) -> PlanSag:
+    return PlanSag(
+        camera=sag.camera,
+        sinks_mm=float(sag.shift),
+        leans_deg=float(sag.lean_deg),
+        touched_mm=float(sag.touched_mm),
+        touched_deg=float(sag.touched_deg),
+        too_far=sag.words if sag.worst.share > 1.0 else "",
     )
 
 

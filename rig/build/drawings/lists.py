@@ -8,7 +8,7 @@ import math
 from collections.abc import Iterable, Sequence
 
 from rig.build.drawings.figures import mm, pose_figures, setting_text
-from rig.build.mounts.plan import MountPlan
+from rig.build.mounts.plan import Give, MountPlan
 
 SETTING_FIELDS = (
     "camera",
@@ -22,6 +22,8 @@ SETTING_FIELDS = (
     "off_by_minus",
     "limit",
     "measured_from",
+    "gives_way_by",
+    "set_more_by",
 )
 TAPE_FIELDS = ("camera", "from", "to", "length_mm")
 POSE_FIELDS = (
@@ -51,6 +53,7 @@ def settings_csv(plan: MountPlan) -> str:
     def finite(value: float) -> str:
         return "" if math.isinf(value) else f"{abs(value):.2f}"
 
+    gives = {(sag.camera, give.setting): give for sag in plan.sags for give in sag.gives}
     rows = []
     for mount in plan.mounts:
         for s in mount.settings:
@@ -59,8 +62,15 @@ def settings_csv(plan: MountPlan) -> str:
             if tolerance is not None:
                 off = (finite(tolerance.plus), finite(tolerance.minus), tolerance.limit)
             span = (f"{s.step:g}", f"{s.low:g}", f"{s.high:g}")
-            rows.append((mount.name, s.name, setting_text(s), s.unit, *span, *off, s.measured_from))
+            give = gives.get((mount.name, s.name))
+            sag = ("", "") if give is None else (f"{give.off:.3f}", f"{_more(give):g}")
+            figures = (setting_text(s), s.unit, *span, *off, s.measured_from, *sag)
+            rows.append((mount.name, s.name, *figures))
     return _csv(SETTING_FIELDS, rows)
+
+
+def _more(give: Give) -> float:
+    return give.aim_out if give.unit == "mm" else 0.0
 
 
 def tapes_csv(plan: MountPlan) -> str:

@@ -15,11 +15,14 @@ from rig.build.drawings.items import Item, Line, Sheet, Text
 from rig.build.drawings.layout import FRONT, TOP, PlacedView, SheetView
 from rig.build.drawings.tables import Table, table_items
 from rig.build.drawings.views import plan_solids
-from rig.build.mounts.plan import MountPlan, Tolerance
+from rig.build.mounts.plan import Give, MountPlan, Tolerance
 from rig.build.mounts.settings import CameraMount, Setting
 from rig.solids.sight import outline
 
 SETTING_COLUMNS = ("Setting", "Set to", "Unit", "Step", "May be off by", "Measured from")
+WEIGHT_COLUMN = "For its weight"
+"""What to set more because the rig sinks under its weight; in brackets what it leans by."""
+
 TAPE_COLUMNS = ("Tape from", "to", "mm")
 LEFT_MM = MARGIN_MM + 8.0
 WIDE_MM = A4_MM[0] - 2.0 * LEFT_MM
@@ -65,11 +68,19 @@ def _carried(mount: CameraMount) -> str:
 
 def _tables(plan: MountPlan, mount: CameraMount) -> list[Table]:
     found = {t.setting: t for t in plan.tolerances if t.camera == mount.name}
+    gives = {g.setting: g for sag in plan.sags if sag.camera == mount.name for g in sag.gives}
+    columns = SETTING_COLUMNS
     settings = tuple(_setting_row(s, found.get(s.name)) for s in mount.settings)
+    if gives:
+        columns = (*columns[:5], WEIGHT_COLUMN, columns[5])
+        settings = tuple(
+            (*row[:5], _for_weight(gives[s.name]), row[5])
+            for row, s in zip(settings, mount.settings, strict=True)
+        )
     tapes = tuple((tape.start, tape.end, mm(tape.length_mm)) for tape in mount.tapes)
     pose = pose_figures(mount.camera, plan.datum_rig_mm)
     return [
-        Table("Set", SETTING_COLUMNS, settings),
+        Table("Set", columns, settings),
         Table("Check with a tape measure", TAPE_COLUMNS, tapes),
         Table("What results: optical centre from the datum", POSE_COLUMNS, (pose,)),
         Table(
@@ -90,6 +101,13 @@ def _setting_row(setting: Setting, tolerance: Tolerance | None) -> tuple[str, ..
         "–" if tolerance is None else _tolerance(tolerance),
         setting.measured_from,
     )
+
+
+def _for_weight(give: Give) -> str:
+    """What to set more; in brackets what an angle gives way by, or what is made to the figure."""
+    if give.unit == "mm" and give.step > 0.0:
+        return f"{give.aim_out:+g}" if give.aim_out else "0"
+    return f"({fixed(give.off, 2)})"
 
 
 def _tolerance(tolerance: Tolerance) -> str:

@@ -20,6 +20,10 @@ from rig.build.mounts.steps import assembly_steps
 from rig.build.mounts.surroundings import SEAT_HEIGHT_MM, Surroundings, Zone, head_entry
 from rig.build.mounts.systems.base import Holding, MountSystem
 from rig.build.mounts.tolerancing import Tolerancer, trials_for, yield_share
+from rig.build.statics.sag import Masses
+from rig.build.statics.stiffening import Stiffened, settled_sags, stiffened
+from rig.catalogue import load_catalogue
+from rig.catalogue.items import Profile
 from rig.design.layout import foremost_point
 from solver.limits import Limits
 from solver.quality import evaluate
@@ -33,6 +37,9 @@ class SystemSpec:
     ``zones`` stay free, and the subject's head entry too unless ``entry`` is off.
     ``floor_z_mm`` None: a seated person's nose height under the datum. ``spare``: share of the
     effect of settings half a step off that limits are kept clear of. ``prices`` by catalogue id.
+    ``larger``: the same mount with stays of larger profiles, for cameras that would lean; none
+    where the profile was asked for. ``stiffen`` off: it is built as it is and only judged.
+    ``masses``: what the cameras and parts weigh.
     """
 
     name: str
@@ -44,6 +51,9 @@ class SystemSpec:
     spare: float = 1.0
     prices: dict[str, float] = field(default_factory=dict)
     currency: str = "EUR"
+    masses: Masses = field(default_factory=lambda: Masses(load_catalogue()))
+    larger: tuple[tuple[Profile, MountSystem], ...] = ()
+    stiffen: bool = True
 
     def surroundings(
         self, subject: Subject, limits: Limits, standing: tuple[RigCamera, ...]
@@ -107,6 +117,14 @@ class _Job:
             self.cameras, self.subject, self.limits, steps=spec.system.steps, spare=spec.spare,
             tell=lambda share: self.tell("make room", 0.5 * share), cancel=self.cancel,
         )  # fmt: skip
+
+    def stiff(
+        self, spec: SystemSpec, cameras: tuple[RigCamera, ...], around: Surroundings
+    ) -> Stiffened:
+        """The system with what it needs so that its cameras do not lean, as first arranged."""
+        if not spec.stiffen:
+            return Stiffened(spec.system, spec.system.hold(cameras, around))
+        return stiffened(spec.system, spec.larger, cameras, around, spec.masses)
 
     def rounded(self, holding: Holding, spare: float) -> tuple[CameraMount, ...]:
         """Settings that exist; those of before where all do."""
@@ -199,10 +217,11 @@ def make_plan(
     around = spec.surroundings(subject, limits, standing)
     _must_stand(free, around)
     _must_fit(free, around)
-    naive = tuple(nearest(mount) for mount in spec.system.hold(free, around).mounts)
+    stiff = job.stiff(spec, free, around)
+    naive = tuple(nearest(mount) for mount in stiff.first.mounts)
     roomy, spare = job.relaxed(spec)
     job.tell("arrange", 0.2)
-    holding = spec.system.hold(tuple(c for c in roomy if not c.fixed), around)
+    holding = stiff.system.hold(tuple(c for c in roomy if not c.fixed), around)
     settled = job.rounded(holding, spare)
     job.tell("build", 0.6)
     wanted = {camera.name: camera.pose for camera in free}
@@ -216,6 +235,7 @@ def make_plan(
         tell=lambda share: job.tell("tolerances", 0.65 + 0.25 * share), cancel=job.cancel,
     )  # fmt: skip
     tolerances = tolerancer.each()
+    found, unknown = settled_sags(built.structure, built.mounts, tolerances, spec.masses)
     job.tell("trials", 0.9)
     count = trials_for(len(cameras)) if trials is None else trials
     share = yield_share(
@@ -235,5 +255,6 @@ def make_plan(
         yield_share=share,
         yield_trials=count,
         steps=assembly_steps(built.structure, built.mounts),
-        notes=built.notes,
+        notes=(*built.notes, *stiff.notes, *unknown),
+        sags=found,
     )

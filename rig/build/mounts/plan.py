@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from geometry.arrays import Floats
+import numpy as np
+
+from geometry.arrays import Floats, frozen
 from rig.build.mounts.settings import CameraMount
 from rig.build.mounts.structure import Structure
 
@@ -67,13 +69,89 @@ class Clash:
     required_mm: float
 
 
+@dataclass(frozen=True)
+class Give:
+    """How far a setting would have to be off to move a camera as its sag does, in its unit.
+
+    ``allowed``: how far it may be off; infinite where no limit breaks. ``step``: to what it can
+    be set; 0 where the part is made to the figure. Slides are set by tapes with everything hung
+    on the frame, so that whole steps of their sag can be aimed out; an angle is not, for it is
+    set on a head that has leaned already.
+    """
+
+    setting: str
+    unit: str
+    off: float
+    allowed: float
+    step: float
+
+    @property
+    def aim_out(self) -> float:
+        """What to set more so that the camera, when it has sunk, stands where it should."""
+        if self.step <= 0.0:
+            return 0.0
+        return -self.step * round(self.off / self.step) + 0.0
+
+    @property
+    def left(self) -> float:
+        """What is left of it: of a slide when it is aimed out, of anything else all."""
+        return self.off + (self.aim_out if self.unit == "mm" else 0.0)
+
+    @property
+    def share(self) -> float:
+        """What is left as a share of what is allowed."""
+        return abs(self.left) / self.allowed if self.allowed > 0.0 else float(self.left != 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Sag:
+    """How one camera gives way to the weight of the whole rig.
+
+    ``shift_mm`` (3,) of its optical centre in the rig frame; ``lean_deg`` how far it turns.
+    ``touched_mm``, ``touched_deg``: what a touch of 5 N does to it at most, while it lasts.
+    ``gives``: the same as errors of its settings.
+    """
+
+    camera: str
+    shift_mm: Floats
+    lean_deg: float
+    touched_mm: float
+    touched_deg: float
+    gives: tuple[Give, ...]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "shift_mm", frozen(self.shift_mm))
+
+    @property
+    def shift(self) -> float:
+        """How far its optical centre moves, mm."""
+        return float(np.linalg.norm(self.shift_mm))
+
+    @property
+    def words(self) -> str:
+        """What it does where it gives way most, and the limit."""
+        worst = self.worst
+        unit = "degrees" if worst.unit == "deg" else "mm"
+        verb = "leans" if worst.unit == "deg" else "sinks"
+        return (
+            f"it {verb} by {abs(worst.left):.2f} {unit} of {worst.setting} at {self.camera}, "
+            f"the limit is {worst.allowed:.2f}"
+        )
+
+    @property
+    def worst(self) -> Give:
+        """What comes nearest to what is allowed, or goes farthest beyond."""
+        return max(self.gives, key=lambda give: give.share)
+
+
 @dataclass(frozen=True, eq=False)
 class MountPlan:
     """A plan that can be built. ``system`` is the kind of mount; ``datum_rig_mm`` (3,).
 
     ``clashes`` is empty for a plan that can be built. ``steps`` are the assembly steps in order.
     ``yield_share``: share of Monte Carlo rigs, every setting off by a uniform error of half a
-    step, that kept all limits; of ``yield_trials``.
+    step, that kept all limits; of ``yield_trials``. ``sags``: how each camera gives way under its
+    own weight; empty where the mount is not of members.
     """
 
     name: str
@@ -88,3 +166,10 @@ class MountPlan:
     yield_trials: int
     steps: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    sags: tuple[Sag, ...] = ()
+
+    @property
+    def leaning(self) -> tuple[Sag, ...]:
+        """Cameras that give way more than a limit of the design allows, the worst first."""
+        over = [sag for sag in self.sags if sag.worst.share > 1.0]
+        return tuple(sorted(over, key=lambda sag: -sag.worst.share))

@@ -21,6 +21,7 @@ from rig.build.mounts.planmodel import (
     MountModel,
     PlanFile,
     PriceModel,
+    SagModel,
     SettingModel,
     TapeModel,
     ToleranceModel,
@@ -50,6 +51,7 @@ def plan_document(plan: MountPlan) -> dict[str, Any]:
         yield_trials=plan.yield_trials,
         steps=list(plan.steps),
         notes=list(plan.notes),
+        sags=[SagModel.of(sag) for sag in plan.sags],
     )
     return file.model_dump(by_alias=True)
 
@@ -106,6 +108,7 @@ def plan_from_mapping(data: object, name: str = "plan") -> MountPlan:
         yield_trials=file.yield_trials,
         steps=tuple(file.steps),
         notes=tuple(file.notes),
+        sags=tuple(sag.made() for sag in file.sags),
     )
 
 

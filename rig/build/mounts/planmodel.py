@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from common.files.strict import Matrix, StrictModel, Vector
-from rig.build.mounts.plan import Clash, Figures, Price, Tolerance
+from rig.build.mounts.plan import Clash, Figures, Give, Price, Sag, Tolerance
 from rig.build.mounts.settings import Link, Motion, Setting, Tape
 from rig.build.mounts.structuremodel import StructureModel, Transform, table
 from rig.design.designmodel import PlacedCamera
@@ -184,6 +184,52 @@ class ClashModel(StrictModel):
         return Clash(**dict(self))
 
 
+class GiveModel(StrictModel):
+    """The sag as the error of one setting; None: no limit breaks."""
+
+    setting: str
+    unit: Literal["mm", "deg"]
+    off: float
+    allowed: float | None
+    step: float
+
+    def made(self) -> Give:
+        """What it describes."""
+        allowed = float("inf") if self.allowed is None else self.allowed
+        return Give(self.setting, self.unit, self.off, allowed, self.step)
+
+
+class SagModel(StrictModel):
+    """How a camera gives way."""
+
+    camera: str
+    shift_mm: Vector
+    lean_deg: float
+    touched_mm: float
+    touched_deg: float
+    gives: list[GiveModel]
+
+    @classmethod
+    def of(cls, sag: Sag) -> Self:
+        """The section that describes ``sag``."""
+        gives = [
+            GiveModel.model_validate(
+                vars(give) | {"allowed": give.allowed if np.isfinite(give.allowed) else None}
+            )
+            for give in sag.gives
+        ]
+        facts = {"shift_mm": [float(v) for v in sag.shift_mm], "gives": gives}
+        return cls.model_validate(vars(sag) | facts)
+
+    def made(self) -> Sag:
+        """What it describes."""
+        gives = tuple(give.made() for give in self.gives)
+        return Sag(
+            self.camera, np.array(self.shift_mm), self.lean_deg, self.touched_mm,
+            self.touched_deg, gives,
+        )  # fmt: skip
+
+
 class PlanFile(StrictModel):
     """The root of a plan file."""
 
@@ -203,3 +249,6 @@ class PlanFile(StrictModel):
     yield_trials: int = Field(ge=0, description="How many were tried.")
     steps: list[str] = Field(description="The assembly steps.")
     notes: list[str] = Field(description="What else to know.")
+    sags: list[SagModel] = Field(
+        default_factory=list, description="How each camera gives way under the rig's own weight."
+    )

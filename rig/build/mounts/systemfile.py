@@ -24,7 +24,9 @@ from rig.build.mounts.systems.heads import HeadKind
 from rig.build.mounts.systems.parts import outrigger_of, plate_of, profile_named, stand_named
 from rig.build.mounts.systems.tripods import TripodSystem
 from rig.build.mounts.systems.tslot import TSlotSystem
+from rig.build.statics.sag import Masses
 from rig.catalogue import Catalogue, load_catalogue
+from rig.catalogue.items import Profile
 
 SCHEMA: Literal["rigwright.mount/1"] = "rigwright.mount/1"
 
@@ -99,6 +101,15 @@ class SystemFile(StrictModel):
     prices: dict[str, float] = Field(
         default_factory=dict, description="Price of a part by its catalogue id; profiles per metre."
     )
+    camera_kg: float = Field(
+        default=0.5, gt=0.0, le=20.0,
+        description="Mass of a camera with its lens, where the catalogue does not say it.",
+    )  # fmt: skip
+    stiffen: bool = Field(
+        default=True,
+        description="Build in back-stays, and a larger profile where none is named, if cameras "
+        "would lean.",
+    )
     currency: str = Field(default="EUR", max_length=8, description="Currency of the prices.")
 
     def to_spec(self, catalogue: Catalogue) -> SystemSpec:
@@ -113,6 +124,9 @@ class SystemFile(StrictModel):
             spare=self.spare,
             prices=dict(self.prices),
             currency=self.currency,
+            masses=Masses(catalogue, self.camera_kg),
+            larger=self._larger(catalogue),
+            stiffen=self.stiffen,
         )
 
     def checked(self, catalogue: Catalogue, name: str = "mount") -> SystemSpec:
@@ -123,8 +137,19 @@ class SystemFile(StrictModel):
             # It is not what was asked for that is missing, but what the file names.
             raise InputError(error.detail, f"{name}: {error.problem}", error.remedy) from error
 
-    def _system(self, catalogue: Catalogue) -> MountSystem:
-        profile = profile_named(self.profile or _PROFILES[self.kind], catalogue)
+    def _larger(self, catalogue: Catalogue) -> tuple[tuple[Profile, MountSystem], ...]:
+        """The same mount with stays, of each profile that may be taken instead."""
+        if self.profile is not None or self.kind not in ("t-slot", "arc"):
+            return ()
+        found = []
+        for profile in (profile_named(name, catalogue) for name in _LARGER):
+            system = self._system(catalogue, profile)
+            if isinstance(system, TSlotSystem | ArcSystem):
+                found.append((profile, replace(system, stays=True)))
+        return tuple(found)
+
+    def _system(self, catalogue: Catalogue, profile: Profile | None = None) -> MountSystem:
+        profile = profile or profile_named(self.profile or _PROFILES[self.kind], catalogue)
         if self.kind == "plate":
             return plate_of(profile, self.thickness_mm, self.material, catalogue)
         head = HeadKind.named(self.head, catalogue)
@@ -139,6 +164,7 @@ class SystemFile(StrictModel):
         return TSlotSystem(parts, self.slot_step_mm, self.share_mm)
 
 
+_LARGER = ("3030", "4040")
 _PROFILES = {"t-slot": "2020", "plate": "2040", "arc": "2020", "tripods": "2020"}
 
 

@@ -16,6 +16,7 @@ from rig.build.drawings.views import plan_solids
 from rig.build.mounts.plan import MountPlan
 from rig.build.mounts.settings import CameraMount
 from rig.build.page.planview import plan_figure
+from rig.build.page.stiffness import stiffness
 from rig.build.parts.bill import Bill
 from rig.build.parts.cuts import Cut
 
@@ -27,6 +28,7 @@ CONTENTS = (
     ("structure", "Structure"),
     ("accuracy", "Accuracy"),
     ("settings", "Settings"),
+    ("stiffness", "Stiffness"),
     ("parts", "Parts"),
     ("cuts", "Cut list"),
     ("steps", "Steps"),
@@ -70,8 +72,9 @@ def _part(name: str) -> str:
 
 
 def _heading(plan: MountPlan) -> str:
+    contents = [entry for entry in CONTENTS if plan.sags or entry[0] != "stiffness"]
     words = f"Mount plan ({plan.system}) for {len(plan.mounts)} cameras"
-    links = "".join(element("a", esc(name), href=f"#{key}") for key, name in CONTENTS)
+    links = "".join(element("a", esc(name), href=f"#{key}") for key, name in contents)
     return f"<h1>{esc(plan.name)}</h1><p>{esc(words)}</p><nav>{links}</nav>"
 
 
@@ -83,6 +86,7 @@ def _main(plan: MountPlan, bill: Bill, cuts: tuple[Cut, ...]) -> str:
             _structure(),
             _accuracy(plan),
             _settings(plan),
+            stiffness(plan),
             _parts(bill),
             _cuts(cuts),
             _steps(plan),
@@ -98,11 +102,15 @@ def _verdict(plan: MountPlan) -> str:
     elif not plan.price.built.feasible:
         word = "It can be built, but the rounded rig breaks limits of the design."
         more = f"Broken: {', '.join(plan.price.built.broken)}."
+    elif plan.leaning:
+        words = plan.leaning[0].words
+        word = f"{words[0].upper()}{words[1:]}."
+        more = "Under Stiffness stands how far each camera gives way, and what would hold it."
     else:
         word = "It can be built: nothing collides and all limits of the design hold."
         loss = percent(max(0.0, plan.price.sigma_loss))
         more = f"Settings that exist cost {loss} of the median σ."
-    broken = bool(plan.clashes) or not plan.price.built.feasible
+    broken = bool(plan.clashes) or not plan.price.built.feasible or bool(plan.leaning)
     css = "verdict broken" if broken else "verdict"
     return (
         f'<div class="{css}"><p class="word">{esc(word)}</p><p class="more">{esc(more)}</p></div>'

@@ -244,10 +244,15 @@ def _plate_line(plate: Plate, prices: Prices) -> BillLine:
     return _line("plate", (plate.id, name, ""), 1, plate_mass_g(plate), prices)
 
 
+def density_g_per_cm3(material: str) -> float | None:
+    """The usual density of a material, by its first word; None for one that is not known."""
+    words = material.lower().split()
+    return DENSITIES_G_PER_CM3.get(words[0]) if words else None
+
+
 def plate_mass_g(plate: Plate) -> float | None:
     """Mass of a plate less its holes and cut-outs; None for a material that is not known."""
-    words = plate.material.lower().split()
-    density = DENSITIES_G_PER_CM3.get(words[0]) if words else None
+    density = density_g_per_cm3(plate.material)
     if density is None:
         return None
     area = _area_mm2(plate.outline_mm) - sum(map(_area_mm2, plate.cutouts_mm))

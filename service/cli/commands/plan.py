@@ -132,8 +132,9 @@ def why_not(result: PlanResult) -> str:
 
 def caution(result: PlanResult) -> str:
     """What is to be known of a rig that can be built; empty when it keeps every limit as set."""
+    over = [sag.too_far for sag in result.sags if sag.too_far]
     if result.price.built.feasible:
-        return ""
+        return f"{over[0]}; plan.html says what would hold it" if over else ""
     return (
         f"as it is set, the rig breaks limits a little that the design keeps "
         f"({_broken(result.price.built)}); a mount with finer settings would keep them"

@@ -33,8 +33,20 @@ def print_plan(result: PlanResult) -> None:
             f"{_figure(clash.clearance_mm, 1)} mm of {_figure(clash.required_mm, 1)} mm",
             markup=False,
         )
+    _print_sags(console, result)
     for note in result.notes:
         console.print(f"note: {note}", markup=False)
+
+
+def _print_sags(console: Console, result: PlanResult) -> None:
+    if not result.sags:
+        return
+    most = max(result.sags, key=lambda sag: sag.leans_deg or 0.0)
+    console.print(
+        f"under its own weight {most.camera} leans most, by {_figure(most.leans_deg, 2)} degrees; "
+        f"a touch of 5 N turns it by {_figure(most.touched_deg, 2)}",
+        markup=False,
+    )
 
 
 def _print_price(console: Console, price: PlanPrice) -> None:

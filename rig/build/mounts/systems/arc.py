@@ -26,6 +26,7 @@ from rig.build.mounts.systems.base import Built
 from rig.build.mounts.systems.hanging import Rail, hang_all
 from rig.build.mounts.systems.outrigger import Hung, Outrigger, Z
 from rig.build.mounts.systems.ribs import Facet, Rib
+from rig.build.mounts.systems.stays import stayed
 
 BEHIND_MM = 90.0
 END_DEG = 10.0
@@ -77,12 +78,16 @@ class _Ribs:
 
 @dataclass(frozen=True, eq=False)
 class ArcSystem:
-    """Ribs on uprights. ``radius_mm`` None: as small as the cameras allow."""
+    """Ribs on uprights. ``radius_mm`` None: as small as the cameras allow.
+
+    ``stays``: with a stay behind each upright.
+    """
 
     outrigger: Outrigger
     step_mm: float
     share_mm: float
     radius_mm: float | None = None
+    stays: bool = False
     kind: str = "arc"
 
     @property
@@ -160,11 +165,17 @@ class ArcHolding:
         )
         return replace(self, hung=hung)
 
+    def with_stays(self) -> Self:
+        """See :class:`rig.build.mounts.systems.base.Holding`."""
+        return replace(self, system=replace(self.system, stays=True))
+
     def build(self) -> Built:
         """See :class:`rig.build.mounts.systems.base.Holding`."""
         facets = [facet for rib in self.ribs for facet in rib.facets]
         props = [m for rib in self.ribs for m in self._props(rib)]
         bars = self._base_bars()
+        stays, stay_joints = self._stays()
+        props += stays
         members = [f.member() for f in facets] + props + bars
         members += [m for h in self.hung for m in h.members()]
         solids = [facet.solid() for facet in facets]
@@ -174,6 +185,7 @@ class ArcHolding:
         ]
         solids += [s for h in self.hung for s in (*h.solids(), *camera_solids(h.mount.camera))]
         joints = [j for rib in self.ribs for j in self._joints(rib)] + self._base_joints(bars)
+        joints += stay_joints
         joints += [j for h in self.hung for j in h.joints(h.mount.values()["along"])]
         touching = [p for h in self.hung for p in h.touching()] + [(j.on, j.other) for j in joints]
         # Feet and base bars meet at the uprights.
@@ -252,6 +264,16 @@ class ArcHolding:
                       facet.lean_deg, pivot),
             ]  # fmt: skip
         return out
+
+    def _stays(self) -> tuple[list[Member], list[Joint]]:
+        """A sill on each foot and a stay for each upright, where the arc has them."""
+        members: list[Member] = []
+        joints: list[Joint] = []
+        for rib in self.ribs if self.system.stays else ():
+            upright, foot = self._props(rib)[:2]
+            more, held = stayed(rib.id, [upright], [foot], self.system.outrigger.stay_parts)
+            members, joints = members + more, joints + held
+        return members, joints
 
     def _row(self) -> list[Rib]:
         return sorted(self.ribs, key=lambda rib: rib.turn_deg)

@@ -30,12 +30,21 @@ class Holding(Protocol):
     """Which camera hangs where, before the settings are final."""
 
     @property
+    def system(self) -> MountSystem:
+        """Whose arrangement it is."""
+        ...
+
+    @property
     def mounts(self) -> tuple[CameraMount, ...]:
         """The cameras on their mounts, in the order they were given."""
         ...
 
     def with_mounts(self, mounts: tuple[CameraMount, ...]) -> Self:
         """The same arrangement at other settings."""
+        ...
+
+    def with_stays(self) -> Self:
+        """The same arrangement with back-stays, where the mount has uprights that can lean."""
         ...
 
     def build(self) -> Built:

@@ -19,6 +19,7 @@ from rig.build.mounts.settings import CameraMount, Link, Motion, Setting, shift,
 from rig.build.mounts.solids import bar, box, carried
 from rig.build.mounts.structure import Joint, Member, PlacedPart, Solid
 from rig.build.mounts.systems.heads import HeadKind, head_id
+from rig.build.mounts.systems.stays import StayParts
 from rig.catalogue.items import Bracket, Profile
 
 X, Y, Z = np.eye(3)
@@ -74,6 +75,11 @@ class Outrigger:
         """Width, length and thickness of the plate under the head."""
         width, length, thick = self.plate.size_mm or (40.0, 60.0, 5.0)
         return width, length, thick
+
+    @property
+    def stay_parts(self) -> StayParts:
+        """What back-stays of the same profile are made of."""
+        return StayParts(self.profile, self.corner, self.pivot, self.screw, self.t_nut)
 
     def stub_y_mm(self, rail_depth_mm: float) -> float:
         """Middle of the stub before the middle of the rail."""

@@ -90,6 +90,7 @@ def plate_of(
     return PlateSystem(
         profile=profile,
         corner=bracket_for(profile, "corner", catalogue),
+        pivot=bracket_for(profile, "pivot", catalogue),
         t_nut=t_nut_for(profile, catalogue),
         screw=screw_for(profile.bolt, catalogue),
         thickness_mm=thickness_mm,

@@ -28,6 +28,7 @@ from rig.build.mounts.surroundings import Surroundings
 from rig.build.mounts.systems.base import Built
 from rig.build.mounts.systems.fits import CAMERA_SCREW, SCREW_HOLES_MM, Fitter, WedgeFit
 from rig.build.mounts.systems.posts import LONGEST_POST_MM, Posted, X, Y, Z, post_for
+from rig.build.mounts.systems.stays import StayParts, stayed
 from rig.build.mounts.tolerancing import MADE_DEG, MADE_MM
 from rig.catalogue import Catalogue
 from rig.catalogue.items import Bracket, Profile
@@ -45,15 +46,20 @@ ROOM_MM = 1.0
 
 @dataclass(frozen=True, eq=False)
 class PlateSystem:
-    """A flat plate on two uprights. ``profile`` makes posts and uprights."""
+    """A flat plate on two uprights. ``profile`` makes posts and uprights.
+
+    ``stays``: with a stay behind each upright.
+    """
 
     profile: Profile
     corner: Bracket
+    pivot: Bracket
     t_nut: str
     screw: str
     thickness_mm: float
     material: str
     catalogue: Catalogue
+    stays: bool = False
     kind: str = "plate"
 
     @property
@@ -140,20 +146,30 @@ class PlateHolding:
         posted = tuple(replace(p, mount=m) for p, m in zip(self.posted, mounts, strict=True))
         return replace(self, posted=posted)
 
+    def with_stays(self) -> Self:
+        """See :class:`rig.build.mounts.systems.base.Holding`."""
+        return replace(self, system=replace(self.system, stays=True))
+
     def build(self) -> Built:
         """See :class:`rig.build.mounts.systems.base.Holding`."""
         low, high = self._extent()
         plate = self._plate(low, high)
         stand = self._stand(low, high)
-        members = (*stand, *(p.member() for p in self.posted))
+        stays, stay_joints = self._stays(stand)
+        members = (*stand, *stays, *(p.member() for p in self.posted))
         thick = self.system.thickness_mm
         solids = [box("plate", "plate", self.face, np.append(low, -thick), np.append(high, 0.0))]
         solids += [
-            bar(m.id, "member", m.axis_mm[0], m.axis_mm[1], m.across, m.size_mm) for m in stand
+            bar(m.id, "member", m.axis_mm[0], m.axis_mm[1], m.across, m.size_mm)
+            for m in (*stand, *stays)
         ]
         solids += [s for p in self.posted for s in (*p.solids(), *camera_solids(p.mount.camera))]
         wedges = tuple(p.wedge() for p in self.posted)
-        joints = (*self._stand_joints(stand), *(j for p in self.posted for j in self._joints(p)))
+        joints = (
+            *self._stand_joints(stand),
+            *stay_joints,
+            *(j for p in self.posted for j in self._joints(p)),
+        )
         touching = [t for p in self.posted for t in p.touching()]
         touching += [("plate", p.post_id) for p in self.posted] + [(j.on, j.other) for j in joints]
         parts: tuple[PlacedPart, ...] = ()
@@ -216,6 +232,14 @@ class PlateHolding:
         axis = carried(self.face, np.array([[high[0] - half, z, depth], [low[0] + half, z, depth]]))
         out.append(Member("cross bar", profile.id, "cross bar", axis, Z, size[::-1]))
         return out
+
+    def _stays(self, stand: list[Member]) -> tuple[list[Member], list[Joint]]:
+        """A sill and a stay for each upright, where the plate has them."""
+        if not self.system.stays:
+            return [], []
+        system, (left, left_foot, right, right_foot, _) = self.system, stand
+        parts = StayParts(system.profile, system.corner, system.pivot, system.screw, system.t_nut)
+        return stayed("of the plate", [left, right], [left_foot, right_foot], parts)
 
     def _stand_joints(self, stand: list[Member]) -> list[Joint]:
         system = self.system

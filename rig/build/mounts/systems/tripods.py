@@ -238,6 +238,10 @@ class TripodHolding:
         stood = tuple(replace(s, mount=m) for s, m in zip(self.stood, mounts, strict=True))
         return replace(self, stood=stood)
 
+    def with_stays(self) -> Self:
+        """A tripod needs none."""
+        return self
+
     def build(self) -> Built:
         """See :class:`rig.build.mounts.systems.base.Holding`."""
         solids = tuple(

@@ -24,6 +24,7 @@ from rig.build.mounts.surroundings import Surroundings
 from rig.build.mounts.systems.base import Built
 from rig.build.mounts.systems.hanging import Rail, hang_all, spread_order
 from rig.build.mounts.systems.outrigger import Hung, Outrigger, X, Y, Z
+from rig.build.mounts.systems.stays import stayed
 from rig.catalogue.items import Profile
 
 BEHIND_MM = 90.0
@@ -143,11 +144,15 @@ class _Bays:
 
 @dataclass(frozen=True, eq=False)
 class TSlotSystem:
-    """A frame of T-slot profile. ``share_mm``: how far from an upright a stub may reach."""
+    """A frame of T-slot profile. ``share_mm``: how far from an upright a stub may reach.
+
+    ``stays``: with a stay behind each upright.
+    """
 
     outrigger: Outrigger
     step_mm: float
     share_mm: float
+    stays: bool = False
     kind: str = "t-slot"
 
     @property
@@ -221,14 +226,20 @@ class TSlotHolding:
         )
         return replace(self, hung=hung)
 
+    def with_stays(self) -> Self:
+        """See :class:`rig.build.mounts.systems.base.Holding`."""
+        return replace(self, system=replace(self.system, stays=True))
+
     def build(self) -> Built:
         """See :class:`rig.build.mounts.systems.base.Holding`."""
         uprights = [_upright_member(u) for u in self.uprights]
         bases = [m for bay in self.bays for m in self._base(bay)]
+        stays, stay_joints = self._stays(uprights)
+        bases += stays
         members = [*uprights, *bases, *(m for h in self.hung for m in h.members())]
         solids = [_upright_solid(m) for m in (*uprights, *bases)]
         solids += [s for h in self.hung for s in (*h.solids(), *camera_solids(h.mount.camera))]
-        joints = [j for bay in self.bays for j in self._base_joints(bay)]
+        joints = [j for bay in self.bays for j in self._base_joints(bay)] + stay_joints
         joints += [j for h in self.hung for j in h.joints(h.mount.values()["height"])]
         touching = [p for h in self.hung for p in h.touching()]
         touching += [(j.on, j.other) for j in joints]
@@ -291,6 +302,18 @@ class TSlotHolding:
             )
         ]
         return rails + feet
+
+    def _stays(self, uprights: list[Member]) -> tuple[list[Member], list[Joint]]:
+        """A sill and stays behind each bay, where the frame has them."""
+        members: list[Member] = []
+        joints: list[Joint] = []
+        for bay in self.bays if self.system.stays else ():
+            mine = {u.id for u in self.uprights if u.bay == bay.index}
+            standing = [m for m in uprights if m.id in mine]
+            feet, parts = self._base(bay)[2:], self.system.outrigger.stay_parts
+            more, held = stayed(str(bay.index + 1), standing, feet, parts)
+            members, joints = members + more, joints + held
+        return members, joints
 
     def _base_joints(self, bay: Bay) -> list[Joint]:
         bottom, top, left, right = self._base(bay)
