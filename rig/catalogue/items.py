@@ -183,14 +183,16 @@ class Bracket(Part):
     bolts: int | None = None
     angle_deg: PairOf | None = None
     step_deg: float | None = None
+    thread: str | None = None
     mass_g: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
 class Fastener(Part):
-    """A screw, nut or stud."""
+    """A screw, nut or stud, or an adapter from the stud ``inner_thread`` to a hole ``thread``."""
 
     thread: str
+    inner_thread: str | None = None
     diameter_mm: float | None = None
     pitch_mm: float | None = None
     head_diameter_mm: float | None = None

@@ -225,18 +225,28 @@ class BracketEntry(Entry):
     bolts: Annotated[int, Field(ge=1, le=100)] | None = Field(default=None, description="How many.")
     angle_deg: Pair | None = Field(default=None, description="Range of its angle.")
     step_deg: Positive | None = Field(default=None, description="What it can be set to.")
+    thread: Words | None = Field(
+        default=None, description="Thread of the stud for a head, of a head plate or a stand."
+    )
     mass_g: Positive | None = Field(default=None, description="Mass.")
 
 
 class FastenerEntry(Entry):
-    """A screw, nut or stud."""
+    """A screw, nut, stud, or an adapter from one thread to another."""
 
-    kind: Literal["cap-screw", "hex-nut", "stud", "t-nut"] = Field(description="Kind of fastener.")
-    thread: Words = Field(description="Thread.")
+    kind: Literal["cap-screw", "hex-nut", "stud", "t-nut", "adapter"] = Field(
+        description="Kind of fastener."
+    )
+    thread: Words = Field(description="Thread; of an adapter the one that goes into a hole.")
+    inner_thread: Words | None = Field(
+        default=None, description="Of an adapter: thread of the stud that goes into it."
+    )
     diameter_mm: Positive | None = Field(default=None, description="Nominal diameter.")
     pitch_mm: Positive | None = Field(default=None, description="Pitch of the thread.")
     head_diameter_mm: Positive | None = Field(default=None, description="Diameter of the head.")
-    head_height_mm: Positive | None = Field(default=None, description="Height of head or nut.")
+    head_height_mm: Positive | None = Field(
+        default=None, description="Height of head or nut; of an adapter what it adds."
+    )
     across_flats_mm: Positive | None = Field(default=None, description="Width across flats.")
     key_mm: Positive | None = Field(default=None, description="Hexagon key.")
     series: Words | None = Field(default=None, description="Profile series it fits.")

@@ -22,6 +22,7 @@ from rig.build.mounts.systems.arc import ArcSystem
 from rig.build.mounts.systems.base import MountSystem
 from rig.build.mounts.systems.heads import HeadKind
 from rig.build.mounts.systems.parts import outrigger_of, plate_of, profile_named, stand_named
+from rig.build.mounts.systems.threads import adapter_for
 from rig.build.mounts.systems.tripods import TripodSystem
 from rig.build.mounts.systems.tslot import TSlotSystem
 from rig.build.statics.sag import Masses
@@ -157,7 +158,10 @@ class SystemFile(StrictModel):
             head = replace(head, step_deg=self.head_step_deg)
         if self.kind == "tripods":
             stand = stand_named(self.stand, catalogue)
-            return TripodSystem(stand, head, self.floor_step_mm, self.slot_step_mm)
+            adapter = adapter_for(
+                stand.thread, head.part.base_thread, f"head {head.part.id}", catalogue
+            )
+            return TripodSystem(stand, head, adapter, self.floor_step_mm, self.slot_step_mm)
         parts = outrigger_of(profile, head, catalogue)
         if self.kind == "arc":
             return ArcSystem(parts, self.slot_step_mm, self.share_mm, self.radius_mm)

@@ -72,7 +72,7 @@ def frame_of(structure: Structure, catalogue: Catalogue) -> StructureFrame:
     feet = _feet(structure.members, nodes)
     if not feet:
         raise InputError("frame-feet", "the structure has no feet", "plan it with a mount that has")
-    held = {}
+    held: dict[tuple[str, str], int] = {}
     links: list[tuple[int, int]] = []
     for joint in structure.joints:
         ends = [_node(end, joint, members, grids, nodes) for end in (joint.on, joint.other)]

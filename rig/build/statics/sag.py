@@ -9,6 +9,7 @@ import numpy as np
 from scipy.spatial import ConvexHull
 
 from geometry.arrays import Floats
+from geometry.camera import RigCamera
 from rig.build.mounts.plan import Give, Sag, Tolerance
 from rig.build.mounts.settings import CameraMount, rig_from_camera
 from rig.build.mounts.solids import lens_front
@@ -38,14 +39,14 @@ class Masses:
     catalogue: Catalogue
     camera_kg: float = 0.5
 
-    def of_camera(self, mount: CameraMount) -> float:
+    def of_camera(self, camera: RigCamera) -> float:
         """A camera with its lens, kg."""
-        known = self.published(mount)
+        known = self.published(camera)
         return self.camera_kg if known is None else known
 
-    def published(self, mount: CameraMount) -> float | None:
+    def published(self, camera: RigCamera) -> float | None:
         """The same as the catalogue has it; None where it does not say."""
-        parts = self.catalogue.parts_of(mount.camera.camera.name)
+        parts = self.catalogue.parts_of(camera.camera.name)
         known = [getattr(part, "mass_g", None) for part in parts or () if part.kind != "built-in"]
         if not known or any(mass is None for mass in known):
             return None
@@ -136,7 +137,11 @@ def _hung(
 
     for mount in mounts:
         body = mount.camera.camera.body.centre_camera_mm
-        hang(holders[mount.name], mount.camera.pose.to_rig(body[None])[0], masses.of_camera(mount))
+        hang(
+            holders[mount.name],
+            mount.camera.pose.to_rig(body[None])[0],
+            masses.of_camera(mount.camera),
+        )
     for part in structure.parts:
         if part.camera in holders:
             hang(holders[part.camera], part.rig_from_part[:3, 3], masses.of_part(part.part))

@@ -76,7 +76,7 @@ def settled_sags(
     except InputError as error:
         return (), (f"Whether it leans is not known: {error.problem}; {error.remedy}.",)
     notes = []
-    heavy = [mount.name for mount in mounts if masses.published(mount) is None]
+    heavy = [mount.name for mount in mounts if masses.published(mount.camera) is None]
     if found and heavy:
         notes.append(
             f"A camera with its lens is taken as {masses.camera_kg:g} kg: say camera_kg if it is "

@@ -24,6 +24,7 @@ from rig.build.mounts.structure import Joint, Member, Solid, Structure
 from rig.build.mounts.surroundings import Surroundings
 from rig.build.mounts.systems.base import Built
 from rig.build.mounts.systems.hanging import Rail, hang_all
+from rig.build.mounts.systems.heads import HeadKind
 from rig.build.mounts.systems.outrigger import Hung, Outrigger, Z
 from rig.build.mounts.systems.ribs import Facet, Rib
 from rig.build.mounts.systems.stays import stayed
@@ -89,6 +90,11 @@ class ArcSystem:
     radius_mm: float | None = None
     stays: bool = False
     kind: str = "arc"
+
+    @property
+    def head(self) -> HeadKind:
+        """The head of every camera."""
+        return self.outrigger.head
 
     @property
     def steps(self) -> tuple[float, float]:

@@ -10,6 +10,7 @@ from rig.build.mounts.clashes import Joined
 from rig.build.mounts.settings import CameraMount
 from rig.build.mounts.structure import Structure
 from rig.build.mounts.surroundings import Surroundings
+from rig.build.mounts.systems.heads import HeadKind
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +59,11 @@ class MountSystem(Protocol):
     @property
     def kind(self) -> str:
         """``t-slot``, ``plate``, ``arc`` or ``tripods``."""
+        ...
+
+    @property
+    def head(self) -> HeadKind | None:
+        """The heads of its cameras; None where they have none."""
         ...
 
     @property

@@ -16,9 +16,10 @@ from rig.build.mounts.kinematics import ANGLES, frames_along, head_angles, head_
 from rig.build.mounts.settings import CameraMount, Link, Setting, shift
 from rig.build.mounts.solids import round_part
 from rig.build.mounts.structure import Solid
+from rig.build.mounts.systems.threads import adapter_for, camera_thread
 from rig.catalogue import Catalogue
 from rig.catalogue.catalogue import pick
-from rig.catalogue.items import Head
+from rig.catalogue.items import Fastener, Head
 
 PLATE_MM = 8.0
 """Thickness of the disk under the camera, and how far it may be turned past a round figure."""
@@ -57,6 +58,9 @@ class HeadKind:
     others: tuple[HeadKind, ...] = ()
     """The other heads of the catalogue, for advice where this one cannot hold a camera."""
 
+    catalogue: Catalogue | None = None
+    """Where adapters for cameras of another thread are found."""
+
     @classmethod
     def named(cls, wanted: str, catalogue: Catalogue) -> HeadKind:
         """From the catalogue; raises for one whose figures do not suffice."""
@@ -66,7 +70,7 @@ class HeadKind:
             for part in catalogue.heads.values()
             if part.id != chosen.part.id and all(getattr(part, key) is not None for key in _NEEDED)
         ]
-        return replace(chosen, others=tuple(others))
+        return replace(chosen, others=tuple(others), catalogue=catalogue)
 
     @classmethod
     def _of(cls, wanted: str, catalogue: Catalogue) -> HeadKind:
@@ -105,6 +109,29 @@ class HeadKind:
     def room_deg(self) -> float:
         """The margin that a head must keep: a step, less what angles lose on their way."""
         return self.step_deg - 1e-9
+
+    def camera_adapter(self, camera: RigCamera) -> Fastener | None:
+        """What goes between its stud and the camera's thread."""
+        if self.catalogue is None:
+            return None
+        thread = camera_thread(camera, self.catalogue)
+        stud = self.part.camera_thread
+        return adapter_for(stud, thread, f"camera {camera.name}", self.catalogue)
+
+    def must_carry(self, camera: RigCamera, mass_kg: float) -> None:
+        """Raises :class:`InputError` for a camera that is too heavy for it."""
+        most = self.part.load_kg
+        if most is None or mass_kg <= most:
+            return
+        able = [h.part.id for h in self.others if (h.part.load_kg or 0.0) >= mass_kg]
+        raise InputError(
+            "head-load",
+            f"head {self.part.id} carries {most:g} kg, but {camera.name} with its lens has "
+            f"{mass_kg:g} kg",
+            f"choose head {' or '.join(able[:3])}"
+            if able
+            else "choose another mount, for no head of the catalogue carries it",
+        )
 
     def links(self, base: Floats, camera: RigCamera) -> tuple[Link, ...]:
         """The chain from the frame before its base to the camera."""

@@ -20,7 +20,8 @@ from rig.build.mounts.solids import bar, box, carried
 from rig.build.mounts.structure import Joint, Member, PlacedPart, Solid
 from rig.build.mounts.systems.heads import HeadKind, head_id
 from rig.build.mounts.systems.stays import StayParts
-from rig.catalogue.items import Bracket, Profile
+from rig.build.mounts.systems.threads import counted, height_mm
+from rig.catalogue.items import Bracket, Fastener, Profile
 
 X, Y, Z = np.eye(3)
 FACES: tuple[tuple[str, Floats], ...] = (("top", Z), ("under", -Z), ("right", X), ("left", -X))
@@ -64,6 +65,7 @@ class Outrigger:
     t_nut: str
     screw: str
     head: HeadKind
+    adapter: Fastener | None = None
 
     @property
     def size_mm(self) -> tuple[float, float]:
@@ -91,7 +93,7 @@ class Outrigger:
         joint = 0.0 if foot.pitch_deg == 0.0 else self.joint_mm
         under = (self._half_along(foot.face) + joint) * foot.face - length / 2.0 * Y
         rotation = foot.rotation()
-        return rotated(rotation, under + thick * rotation[:, 2])
+        return rotated(rotation, under + (thick + height_mm(self.adapter)) * rotation[:, 2])
 
     @property
     def joint_mm(self) -> float:
@@ -181,7 +183,8 @@ class Hung:
     def placed(self) -> tuple[PlacedPart, ...]:
         """Plate and head."""
         foot = self.arm_front() @ self.parts.base(self.foot)
-        plate = foot @ shift(np.array([0.0, 0.0, -self.parts.plate_mm[2]]))
+        under = self.parts.plate_mm[2] + height_mm(self.parts.adapter)
+        plate = foot @ shift(np.array([0.0, 0.0, -under]))
         name = self.mount.name
         return (
             PlacedPart(f"{name} plate", self.parts.plate.id, "head plate", plate, name),
@@ -204,7 +207,7 @@ class Hung:
         )
 
     def joints(self, rail_along_mm: float) -> tuple[Joint, ...]:
-        """Stub on rail, arm on stub, plate on arm, camera on head."""
+        """Stub on rail, arm on stub, plate on arm, head on plate, camera on head."""
         stub, arm = self.members()
         plate, head = self.placed()
         bolts = {self.parts.screw: 2, self.parts.t_nut: 2}
@@ -228,7 +231,10 @@ class Hung:
                 f"{name} c", arm.id, plate.id, plate.rig_from_part[:3, 3],
                 arm.length_mm - self.parts.plate_mm[1] / 2.0, pitch or None, bolts,
             ),
-            Joint(f"{name} d", head.id, name, seat, None, None, {}),
+            Joint(f"{name} d", plate.id, head.id, head.rig_from_part[:3, 3], None, None,
+                  counted(self.parts.adapter)),
+            Joint(f"{name} e", head.id, name, seat, None, None,
+                  counted(self.parts.head.camera_adapter(self.mount.camera))),
         )  # fmt: skip
 
     def touching(self) -> tuple[tuple[str, str], ...]:

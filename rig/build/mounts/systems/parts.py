@@ -6,6 +6,7 @@ from common.errors import InputError
 from rig.build.mounts.systems.heads import HeadKind
 from rig.build.mounts.systems.outrigger import Outrigger
 from rig.build.mounts.systems.plate import PlateSystem
+from rig.build.mounts.systems.threads import adapter_for
 from rig.catalogue import Catalogue
 from rig.catalogue.catalogue import pick
 from rig.catalogue.items import Bracket, Profile
@@ -16,8 +17,13 @@ def profile_named(wanted: str, catalogue: Catalogue) -> Profile:
     return pick(wanted, catalogue.profiles, "profile")
 
 
-def bracket_for(profile: Profile, kind: str, catalogue: Catalogue) -> Bracket:
-    """The bracket of a kind that fits a profile and whose size is known."""
+def bracket_for(
+    profile: Profile, kind: str, catalogue: Catalogue, thread: str | None = None
+) -> Bracket:
+    """The bracket of a kind that fits a profile and whose size is known.
+
+    One with a stud ``thread`` before others, which need an adapter.
+    """
     fitting = [
         bracket
         for bracket in catalogue.brackets.values()
@@ -32,7 +38,7 @@ def bracket_for(profile: Profile, kind: str, catalogue: Catalogue) -> Bracket:
             f"the catalogue has no {kind} bracket for profile {profile.id}",
             f"choose a profile of series {' or '.join(series)}, or add the bracket",
         )
-    return fitting[0]
+    return next((b for b in fitting if thread and b.thread == thread), fitting[0])
 
 
 def t_nut_for(profile: Profile, catalogue: Catalogue) -> str:
@@ -65,9 +71,12 @@ def screw_for(thread: str | None, catalogue: Catalogue) -> str:
 
 def outrigger_of(profile: Profile, head: HeadKind, catalogue: Catalogue) -> Outrigger:
     """Stub, arm, plate and head of one profile."""
+    thread = head.part.base_thread
+    plate = bracket_for(profile, "head-plate", catalogue, thread)
     return Outrigger(
         profile=profile,
-        plate=bracket_for(profile, "head-plate", catalogue),
+        plate=plate,
+        adapter=adapter_for(plate.thread, thread, f"head {head.part.id}", catalogue),
         corner=bracket_for(profile, "corner", catalogue),
         pivot=bracket_for(profile, "pivot", catalogue),
         t_nut=t_nut_for(profile, catalogue),

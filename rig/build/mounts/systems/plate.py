@@ -61,6 +61,7 @@ class PlateSystem:
     catalogue: Catalogue
     stays: bool = False
     kind: str = "plate"
+    head: None = None
 
     @property
     def steps(self) -> tuple[float, float]:

@@ -29,7 +29,8 @@ from rig.build.mounts.structure import Joint, PlacedPart, Solid, Structure
 from rig.build.mounts.surroundings import Surroundings
 from rig.build.mounts.systems.base import Built
 from rig.build.mounts.systems.heads import HeadKind, Stance, head_id, stances
-from rig.catalogue.items import Bracket
+from rig.build.mounts.systems.threads import counted, height_mm
+from rig.catalogue.items import Bracket, Fastener
 
 X, Y, Z = np.eye(3)
 COLUMN_MM = 30.0
@@ -109,6 +110,21 @@ class Stood:
         )
         return stand, plate, head
 
+    def joints(self, adapter: Fastener | None) -> tuple[Joint, ...]:
+        """Part on part, with an ``adapter`` under the head, and the camera on its head."""
+        name, placed = self.mount.name, self.placed()
+        head = placed[-1]
+        held = [
+            Joint(f"{name} {mark}", a.id, b.id, b.rig_from_part[:3, 3], None, None,
+                  counted(adapter) if b is head else {})
+            for mark, (a, b) in zip("ab", pairwise(placed), strict=False)
+        ]  # fmt: skip
+        seat = self.mount.camera.pose.to_rig(
+            self.mount.camera.camera.body.mount_thread_camera_mm[None]
+        )[0]
+        between = counted(self.head.camera_adapter(self.mount.camera))
+        return (*held, Joint(f"{name} c", head.id, name, seat, None, None, between))
+
     def touching(self) -> tuple[tuple[str, str], ...]:
         """Pairs of owners that touch by intent."""
         head = head_id(self.mount.name)
@@ -135,6 +151,7 @@ class TripodSystem:
 
     stand: Bracket
     head: HeadKind
+    adapter: Fastener | None
     floor_step_mm: float
     column_step_mm: float
     kind: str = "tripods"
@@ -202,10 +219,13 @@ class TripodSystem:
     def _top(self, foot: str) -> Floats:
         """The head's foot (4, 4) from the top of the column."""
         rotation = dict(FEET)[foot]
+        lift = height_mm(self.adapter)
         if foot == LEVEL:
-            return rotated(rotation)
+            return rotated(rotation, lift * Z)
         # On the angle plate the head lies beside the column's line, clear of its top.
-        return rotated(rotation, ANGLE_MM * rotation[:, 2] + (self.head.width_mm / 2.0 + 20.0) * Z)
+        return rotated(
+            rotation, (ANGLE_MM + lift) * rotation[:, 2] + (self.head.width_mm / 2.0 + 20.0) * Z
+        )
 
     def _slides(self) -> tuple[Setting, ...]:
         mark = "the plumb point of the datum on the floor to the middle of the column"
@@ -247,11 +267,7 @@ class TripodHolding:
         solids = tuple(
             s for stood in self.stood for s in (*stood.solids(), *camera_solids(stood.mount.camera))
         )
-        joints = tuple(
-            Joint(f"{s.mount.name} {mark}", a.id, b.id, b.rig_from_part[:3, 3])
-            for s in self.stood
-            for mark, (a, b) in zip("ab", pairwise(s.placed()), strict=False)
-        )
+        joints = tuple(j for s in self.stood for j in s.joints(self.system.adapter))
         parts = tuple(p for s in self.stood for p in s.placed())
         touching = [pair for s in self.stood for pair in s.touching()]
         structure = Structure((), (), (), parts, joints, solids)

@@ -23,6 +23,7 @@ from rig.build.mounts.structure import Joint, Member, Solid, Structure
 from rig.build.mounts.surroundings import Surroundings
 from rig.build.mounts.systems.base import Built
 from rig.build.mounts.systems.hanging import Rail, hang_all, spread_order
+from rig.build.mounts.systems.heads import HeadKind
 from rig.build.mounts.systems.outrigger import Hung, Outrigger, X, Y, Z
 from rig.build.mounts.systems.stays import stayed
 from rig.catalogue.items import Profile
@@ -154,6 +155,11 @@ class TSlotSystem:
     share_mm: float
     stays: bool = False
     kind: str = "t-slot"
+
+    @property
+    def head(self) -> HeadKind:
+        """The head of every camera."""
+        return self.outrigger.head
 
     @property
     def steps(self) -> tuple[float, float]:
