@@ -69,8 +69,10 @@ def _carried(mount: CameraMount) -> str:
 def _tables(plan: MountPlan, mount: CameraMount) -> list[Table]:
     found = {t.setting: t for t in plan.tolerances if t.camera == mount.name}
     gives = {g.setting: g for sag in plan.sags if sag.camera == mount.name for g in sag.gives}
-    columns = SETTING_COLUMNS
-    settings = tuple(_setting_row(s, found.get(s.name)) for s in mount.settings)
+    columns: tuple[str, ...] = SETTING_COLUMNS
+    settings: tuple[tuple[str, ...], ...] = tuple(
+        _setting_row(s, found.get(s.name)) for s in mount.settings
+    )
     if gives:
         columns = (*columns[:5], WEIGHT_COLUMN, columns[5])
         settings = tuple(

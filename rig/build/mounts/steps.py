@@ -14,7 +14,8 @@ def assembly_steps(structure: Structure, mounts: tuple[CameraMount, ...]) -> tup
         steps.append(f"Print the wedges: {', '.join(wedge.id for wedge in structure.wedges)}.")
     own = {m.name: {part for part in m.carried_by if part.startswith(f"{m.name} ")} for m in mounts}
     of_one = {m.name for m in mounts}.union(*own.values())
-    steps += [f"J{_join(j)[1:]}." for j in structure.joints if not {j.on, j.other} & of_one]
+    starts = {member.id: member.start for member in structure.members}
+    steps += [f"J{_join(j, starts)[1:]}." for j in structure.joints if not {j.on, j.other} & of_one]
     steps.append(
         "Set up the subject's head form or a pointer at the datum, and check that the mount stands "
         "level and square to it."
@@ -22,15 +23,26 @@ def assembly_steps(structure: Structure, mounts: tuple[CameraMount, ...]) -> tup
     for mount in mounts:
         mine = own[mount.name] | {mount.name}
         joints = [j for j in structure.joints if {j.on, j.other} & mine]
-        steps.append(f"Hang {mount.name}: {_hang(mount, joints, structure.wedges)}.")
+        steps.append(f"Hang {mount.name}: {_hang(mount, joints, structure.wedges, starts)}.")
         steps.append(_set(mount))
         steps.append(_check(mount))
     return tuple(f"{k}. {text}" for k, text in enumerate(steps, 1))
 
 
 def _cut(members: tuple[Member, ...]) -> str:
-    pieces = "; ".join(f"{m.id} {m.part} {m.length_mm:.0f} mm" for m in members)
+    pieces = "; ".join(f"{m.id} {m.part} {m.length_mm:.0f} mm{_mitred(m)}" for m in members)
     return f"Cut to length: {pieces}."
+
+
+def _mitred(member: Member) -> str:
+    """How the saw is turned for a piece that is not cut square."""
+    if not any(member.mitres_deg):
+        return ""
+    start, end = member.mitres_deg
+    return (
+        f" along its middle, {member.long_side_mm:.1f} mm on its longer side, saw turned by "
+        f"{start:.1f} degrees at its {member.start} and {end:.1f} at the other"
+    )
 
 
 def _drill(plate: Plate) -> str:
@@ -42,34 +54,39 @@ def _drill(plate: Plate) -> str:
     return f"Drill {plate.id} ({plate.material}, {plate.thickness_mm:g} mm): {holes}."
 
 
-def _hang(mount: CameraMount, joints: list[Joint], wedges: tuple[Wedge, ...]) -> str:
+def _hang(
+    mount: CameraMount, joints: list[Joint], wedges: tuple[Wedge, ...], starts: dict[str, str]
+) -> str:
     """The joints of one camera in the order in which they can be made."""
     wedge = next((w.id for w in wedges if w.camera == mount.name), None)
     if wedge is None:
-        return "; ".join(_join(joint) for joint in joints)
+        return "; ".join(_join(joint, starts) for joint in joints)
     # On its post the wedge hides the camera's screw; the camera leaves the base screws free.
-    first = [_join(j) for j in joints if wedge not in (j.on, j.other)]
+    first = [_join(j, starts) for j in joints if wedge not in (j.on, j.other)]
     under = [
         f"screw {j.other} onto {j.on} from below, the screw's head in the wedge's pocket" + _with(j)
         for j in joints
         if j.on == wedge
     ]
     last = [
-        f"screw {j.other} onto {j.on} with its camera on it{_where(j)}, by a straight key from "
-        "above" + _with(j)
+        f"screw {j.other} onto {j.on} with its camera on it{_where(j, starts)}, by a straight "
+        "key from above" + _with(j)
         for j in joints
         if j.other == wedge
     ]
     return "; ".join([*first, *under, *last, "plug in the cable last"])
 
 
-def _join(joint: Joint) -> str:
+def _join(joint: Joint, starts: dict[str, str]) -> str:
     angle = "" if joint.angle_deg is None else f", at {joint.angle_deg:.1f} degrees"
-    return f"join {joint.other} to {joint.on}{_where(joint)}{angle}" + _with(joint)
+    return f"join {joint.other} to {joint.on}{_where(joint, starts)}{angle}" + _with(joint)
 
 
-def _where(joint: Joint) -> str:
-    return "" if joint.along_mm is None else f", {joint.along_mm:.0f} mm from its start"
+def _where(joint: Joint, starts: dict[str, str]) -> str:
+    if joint.along_mm is None:
+        return ""
+    start = starts.get(joint.on, "start")
+    return f", the middle {joint.along_mm:.0f} mm from its {start}"
 
 
 def _with(joint: Joint) -> str:

@@ -36,7 +36,8 @@ class Member:
 
     ``across`` is the unit vector of the profile's width, at right angles to the axis (of a bent
     member: the normal of its plane). ``radius_mm`` of a bent member's axis, else None.
-    ``length_mm`` is what is cut, along the axis.
+    ``length_mm`` is what is cut, along the axis. ``mitres_deg``: by how much the saw is turned at
+    start and end, so that the side away from ``across`` x axis is the longer; 0 is a square cut.
     """
 
     id: str
@@ -47,10 +48,27 @@ class Member:
     size_mm: tuple[float, float]
     radius_mm: float | None = None
     note: str = ""
+    mitres_deg: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "axis_mm", frozen(self.axis_mm))
         object.__setattr__(self, "across", frozen(self.across))
+
+    @property
+    def start(self) -> str:
+        """Which end its axis begins at, in words."""
+        x, y, z = self.axis_mm[-1] - self.axis_mm[0]
+        if abs(z) >= max(abs(x), abs(y)):
+            return "lower end" if z > 0.0 else "upper end"
+        if abs(y) >= abs(x):
+            return "rear end" if y > 0.0 else "front end"
+        return "end on the subject's right" if x > 0.0 else "end on the subject's left"
+
+    @property
+    def long_side_mm(self) -> float:
+        """Length of its longer side: what it takes of a bar."""
+        slopes = float(np.tan(np.radians(self.mitres_deg)).sum())
+        return self.length_mm + abs(slopes) * self.size_mm[1] / 2.0
 
     @property
     def length_mm(self) -> float:
@@ -140,7 +158,8 @@ class PlacedPart:
 class Joint:
     """Where ``on`` and ``other`` (ids) meet at ``point_mm``.
 
-    ``along_mm``: from the start of ``on`` to the joint, None where ``on`` is no member.
+    ``along_mm``: from the start of ``on`` to the middle of the joint, None where ``on`` is no
+    member.
     ``angle_deg``: the angle that is set there, None where there is nothing to set.
     ``fasteners``: catalogue entry to count.
     """

@@ -6,6 +6,7 @@ from typing import Annotated, Self
 
 import numpy as np
 from annotated_types import Len
+from pydantic import Field
 
 from common.files.strict import Pair, StrictModel, Vector
 from geometry.arrays import Floats
@@ -41,6 +42,7 @@ class MemberModel(StrictModel):
     size_mm: Pair
     radius_mm: float | None
     note: str
+    mitres_deg: Pair = Field(default_factory=lambda: [0.0, 0.0])
 
     @classmethod
     def of(cls, member: Member) -> Self:
@@ -55,6 +57,7 @@ class MemberModel(StrictModel):
             size_mm=list(member.size_mm),
             radius_mm=member.radius_mm,
             note=member.note,
+            mitres_deg=list(member.mitres_deg),
         )
 
     def made(self) -> Member:
@@ -62,6 +65,7 @@ class MemberModel(StrictModel):
         return Member(
             self.id, self.part, self.role, np.array(self.axis_mm), np.array(self.across),
             (self.size_mm[0], self.size_mm[1]), self.radius_mm, self.note,
+            (self.mitres_deg[0], self.mitres_deg[1]),
         )  # fmt: skip
 
 

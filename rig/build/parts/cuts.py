@@ -16,7 +16,8 @@ SAME_LENGTH_MM = 0.05
 class Cut:
     """Pieces that are cut alike. ``members`` are their ids; ``mass_g`` of all of them.
 
-    ``radius_mm`` of a bent piece's axis; its length is then that of the arc.
+    ``radius_mm`` of a bent piece's axis; its length is then that of the arc. ``mitres_deg``: how
+    far the saw is turned at start and end; ``long_side_mm`` is then longer than the middle.
     """
 
     part: str
@@ -28,6 +29,8 @@ class Cut:
     mass_g: float | None
     radius_mm: float | None = None
     note: str = ""
+    mitres_deg: tuple[float, float] = (0.0, 0.0)
+    long_side_mm: float = 0.0
 
 
 def cut_list(plan: MountPlan, catalogue: Catalogue) -> tuple[Cut, ...]:
@@ -43,9 +46,9 @@ def cut_list(plan: MountPlan, catalogue: Catalogue) -> tuple[Cut, ...]:
 
 
 def _alike(one: Member, other: Member) -> bool:
-    same = (one.part, one.role, one.radius_mm, one.note)
+    same = (one.part, one.role, one.radius_mm, one.note, one.mitres_deg)
     close = abs(one.length_mm - other.length_mm) < SAME_LENGTH_MM
-    return close and same == (other.part, other.role, other.radius_mm, other.note)
+    return close and same == (other.part, other.role, other.radius_mm, other.note, other.mitres_deg)
 
 
 def _cut(group: list[Member], catalogue: Catalogue) -> Cut:
@@ -63,4 +66,6 @@ def _cut(group: list[Member], catalogue: Catalogue) -> Cut:
         mass,
         first.radius_mm,
         first.note,
+        first.mitres_deg,
+        first.long_side_mm,
     )

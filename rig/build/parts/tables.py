@@ -35,6 +35,9 @@ CUT_COLUMNS = (
     "radius_mm",
     "mass_g",
     "note",
+    "mitre_start_deg",
+    "mitre_end_deg",
+    "long_side_mm",
 )
 JOINT_COLUMNS = (
     "joint",
@@ -46,6 +49,7 @@ JOINT_COLUMNS = (
     "y_mm",
     "z_mm",
     "fasteners",
+    "along_from",
 )
 LISTED = "; "
 """Stands between ids in one cell."""
@@ -138,6 +142,8 @@ def cuts_csv(cuts: tuple[Cut, ...]) -> str:
             _figure(cut.radius_mm, 1),
             _figure(cut.mass_g, 1),
             cut.note,
+            *(_figure(mitre, 2) for mitre in cut.mitres_deg),
+            _figure(cut.long_side_mm, 1),
         )
         for cut in cuts
     )
@@ -157,6 +163,8 @@ def cuts_json(cuts: tuple[Cut, ...]) -> str:
             "radius_mm": _number(cut.radius_mm, 1),
             "mass_g": _number(cut.mass_g, 1),
             "note": cut.note,
+            "mitres_deg": [round(mitre, 2) for mitre in cut.mitres_deg],
+            "long_side_mm": round(cut.long_side_mm, 1),
         }
         for cut in cuts
     ]
@@ -164,7 +172,11 @@ def cuts_json(cuts: tuple[Cut, ...]) -> str:
 
 
 def joints_csv(plan: MountPlan) -> str:
-    """Where each joint is marked: along the member it sits on, and its place in the rig frame."""
+    """Where each joint is marked: along the member it sits on, and its place in the rig frame.
+
+    ``along_mm`` counts from the end that ``along_from`` names to the middle of the joint.
+    """
+    starts = {member.id: member.start for member in plan.structure.members}
     rows = (
         (
             joint.id,
@@ -174,6 +186,7 @@ def joints_csv(plan: MountPlan) -> str:
             _figure(joint.angle_deg, 2),
             *(_figure(float(value), 1) for value in joint.point_mm),
             LISTED.join(f"{count}x{part}" for part, count in joint.fasteners.items()),
+            starts.get(joint.on, ""),
         )
         for joint in plan.structure.joints
     )
@@ -182,6 +195,7 @@ def joints_csv(plan: MountPlan) -> str:
 
 def joints_json(plan: MountPlan) -> str:
     """The same as JSON."""
+    starts = {member.id: member.start for member in plan.structure.members}
     document = [
         {
             "joint": joint.id,
@@ -191,6 +205,7 @@ def joints_json(plan: MountPlan) -> str:
             "angle_deg": _number(joint.angle_deg, 2),
             "point_rig_mm": [round(float(value), 1) for value in joint.point_mm],
             "fasteners": dict(joint.fasteners),
+            "along_from": starts.get(joint.on, ""),
         }
         for joint in plan.structure.joints
     ]

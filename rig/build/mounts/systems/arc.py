@@ -36,6 +36,9 @@ END_DEG = 10.0
 FACET_DEG = 24.0
 """Longest facet, in degrees of the arc."""
 
+STRUT_MM = 30.0
+"""From the end of a rib to the middle of the joint of its strut."""
+
 TURNS_DEG = (0.0, 3.0, -3.0, 6.0, -6.0, 10.0, -10.0)
 FOOT_MM = (300.0, 120.0)
 
@@ -235,13 +238,20 @@ class ArcHolding:
             member("foot", [aside, back - FOOT_MM[0], foot], [aside, back + FOOT_MM[1], foot])
         )
         front = back + profile.height_mm / 2.0
-        for role, index in (("lower strut", 0), ("upper strut", rib.count)):
-            end = rib.axes.T @ (rib.corner(index) - rib.centre_mm)
-            length = np.floor(float(end[1]) - profile.height_mm / 2.0 - front)
+        for role, facet in (("lower strut", rib.facets[0]), ("upper strut", rib.facets[-1])):
+            end = rib.axes.T @ (self._strut_end(rib, facet) - rib.centre_mm)
+            length = np.floor(float(end[1]) - front)
             if length > profile.height_mm and end[2] > floor + 3.0 * profile.height_mm:
                 z = float(end[2])
                 out.append(member(role, [0.0, front, z], [0.0, front + float(length), z]))
         return out
+
+    def _strut_end(self, rib: Rib, facet: Facet) -> Floats:
+        """The axis of the pivot joint on a facet's rear, near the end of its rib, (3,)."""
+        along = STRUT_MM if facet.index == 0 else facet.length_mm - STRUT_MM
+        joint = (self.system.outrigger.pivot.size_mm or (20.0, 40.0, 20.0))[1]
+        at = facet.at(along)
+        return np.asarray(at[:3, 3] - (rib.profile.height_mm / 2.0 + joint) * at[:3, 1])
 
     def _joints(self, rib: Rib) -> list[Joint]:
         """Facet to facet, upright to rib, foot to upright, struts between."""
@@ -291,7 +301,10 @@ class ArcHolding:
             ends = [self._props(rib)[0].axis_mm[0] for rib in (one, other)]
             profile = one.profile
             along = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
-            lift, gap = 1.5 * profile.height_mm * Z, profile.width_mm / 2.0 * along
+            # Bars meet the uprights at any angle: on pivots, clear of their edges.
+            joint = (self.system.outrigger.pivot.size_mm or (20.0, 40.0, 20.0))[1]
+            lift = 1.5 * profile.height_mm * Z
+            gap = (joint + float(np.hypot(profile.width_mm, profile.height_mm)) / 2.0) * along
             axis = np.stack([ends[0] + lift + gap, ends[1] + lift - gap])
             size = (profile.width_mm, profile.height_mm)
             across = np.cross(Z, along)
@@ -300,13 +313,19 @@ class ArcHolding:
 
     def _base_joints(self, bars: list[Member]) -> list[Joint]:
         parts = self.system.outrigger
-        two = {parts.corner.id: 2, parts.screw: 4, parts.t_nut: 4}
+        pivot = {parts.pivot.id: 1, parts.screw: 2, parts.t_nut: 2}
         return [
             Joint(f"{member.id} {mark}", f"{rib.id} upright", member.id, member.axis_mm[end],
-                  1.5 * rib.profile.height_mm, None, two)
+                  1.5 * rib.profile.height_mm, _bar_angle_deg(member, rib), pivot)
             for member, ribs in zip(bars, pairwise(self._row()), strict=True)
             for end, (mark, rib) in enumerate(zip("ab", ribs, strict=True))
         ]  # fmt: skip
+
+
+def _bar_angle_deg(member: Member, rib: Rib) -> float:
+    """How far a bar is turned from the line across a rib."""
+    along = (member.axis_mm[1] - member.axis_mm[0]) / member.length_mm
+    return float(np.degrees(np.arccos(np.clip(abs(along @ rib.axes[:, 0]), 0.0, 1.0))))
 
 
 def _whole_facets(radius_mm: float, half_rad: float) -> float:

@@ -171,7 +171,8 @@ class Hung:
         )
         low = float(np.floor(ends[0]))
         stub_axis = np.array([[low, stub_y, 0.0], [low + np.ceil(ends[1] - low), stub_y, 0.0]])
-        length = np.ceil(values["reach"] + part.width_mm - 1e-6)
+        # Rounded down: a longer one would run into the rail behind the stub.
+        length = np.floor(values["reach"] + part.width_mm + 1e-6)
         end = front[:3, 3]
         arm_axis = np.array([end - length * front[:3, 1], end])
         size = (part.width_mm, part.height_mm)

@@ -10,7 +10,7 @@ import numpy as np
 from geometry.arrays import Floats
 from rig.build.mounts.kinematics import frame
 from rig.build.mounts.settings import Link, Motion, Setting, shift, turn
-from rig.build.mounts.solids import bar
+from rig.build.mounts.solids import carried
 from rig.build.mounts.structure import Member, Solid
 from rig.build.mounts.systems.outrigger import Z
 from rig.catalogue.items import Profile
@@ -125,9 +125,24 @@ class Facet:
     def member(self) -> Member:
         """The piece of profile."""
         axis, across = np.stack(self.ends_mm), self.rib.axes[:, 0]
-        return Member(self.id, self.rib.profile.id, "facet", axis, across, self.size_mm)
+        return Member(
+            self.id, self.rib.profile.id, "facet", axis, across, self.size_mm,
+            mitres_deg=self.mitres_deg,
+        )  # fmt: skip
+
+    @property
+    def mitres_deg(self) -> tuple[float, float]:
+        """Half of the bend to the next facet, at the ends that meet one."""
+        half = (self.rib.high_deg - self.rib.low_deg) / self.rib.count / 2.0
+        return (half if self.index else 0.0, half if self.index + 1 < self.rib.count else 0.0)
 
     def solid(self) -> Solid:
-        """The room it takes."""
-        low, high = self.ends_mm
-        return bar(self.id, "member", low, high, self.rib.axes[:, 0], self.size_mm)
+        """The room it takes: shorter on the side of the subject, where facets meet in a mitre."""
+        (width, depth), slopes = self.size_mm, np.tan(np.radians(self.mitres_deg))
+        corners = np.array([
+            [x, y, y * slopes[0] if end == 0 else self.length_mm - y * slopes[1]]
+            for end in (0, 1)
+            for x in (-width / 2.0, width / 2.0)
+            for y in (-depth / 2.0, depth / 2.0)
+        ])  # fmt: skip
+        return Solid(self.id, "member", carried(self._start(), corners))

@@ -246,7 +246,8 @@ class TSlotHolding:
         solids = [_upright_solid(m) for m in (*uprights, *bases)]
         solids += [s for h in self.hung for s in (*h.solids(), *camera_solids(h.mount.camera))]
         joints = [j for bay in self.bays for j in self._base_joints(bay)] + stay_joints
-        joints += [j for h in self.hung for j in h.joints(h.mount.values()["height"])]
+        half = self.system.outrigger.profile.height_mm / 2.0
+        joints += [j for h in self.hung for j in h.joints(h.mount.values()["height"] + half)]
         touching = [p for h in self.hung for p in h.touching()]
         touching += [(j.on, j.other) for j in joints]
         structure = Structure(

@@ -92,8 +92,10 @@ def test_joints_of_the_frame_come_before_the_first_camera_and_each_joint_once() 
     assert len(hung) == 2
     text = " ".join(steps)
     assert len(re.findall("[jJ]oin ", text)) == len(joints)
-    assert "Join post to rail, 120 mm from its start with 2 x corner-2020." in text
-    assert "join cam0 arm to post, 30 mm from its start, at 12.3 degrees" in steps[hung[0]]
+    assert "Join post to rail, the middle 120 mm from its start with 2 x corner-2020." in text
+    assert (
+        "join cam0 arm to post, the middle 30 mm from its start, at 12.3 degrees" in steps[hung[0]]
+    )
     assert "join cam0 to cam0 arm" in steps[hung[0]]
     assert "cam1" not in steps[hung[0]] and "cam0" not in steps[hung[1]]
 
@@ -119,7 +121,7 @@ def test_a_camera_is_on_its_wedge_before_the_wedge_is_on_its_post() -> None:
     order = [
         hang.index("join cam0 post to board"),
         hang.index("screw cam0 onto cam0 wedge from below"),
-        hang.index("screw cam0 wedge onto cam0 post with its camera on it, 210 mm"),
+        hang.index("screw cam0 wedge onto cam0 post with its camera on it, the middle 210 mm"),
         hang.index("plug in the cable last"),
     ]
     assert order == sorted(order)

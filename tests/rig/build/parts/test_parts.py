@@ -131,6 +131,18 @@ def test_the_cut_list_groups_equal_lengths(tslot: MountPlan) -> None:
     assert sum(int(r["quantity"]) for r in table) == len(tslot.structure.members)
 
 
+def test_a_mitred_piece_is_listed_with_its_angles_and_its_longer_side(tslot: MountPlan) -> None:
+    axis = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 400.0]])
+    square = Member("a", "2020", "facet", axis, np.eye(3)[0], (20.0, 20.0))
+    mitred = replace(square, id="b", mitres_deg=(0.0, 10.0))
+    plan = replace(tslot, structure=replace(tslot.structure, members=(square, mitred)))
+    first, second = rows(cuts_csv(cut_list(plan, CATALOGUE)))
+    assert (first["mitre_end_deg"], first["long_side_mm"]) == ("0.00", "400.0")
+    # Half the depth, 10 mm, times the tangent of 10 degrees: 1.76 mm.
+    assert (second["mitre_end_deg"], second["long_side_mm"]) == ("10.00", "401.8")
+    assert json.loads(cuts_json(cut_list(plan, CATALOGUE)))["cuts"][1]["mitres_deg"] == [0.0, 10.0]
+
+
 def test_a_bent_member_is_cut_to_its_arc(tslot: MountPlan) -> None:
     angles = np.radians(np.linspace(0.0, 90.0, 10))
     axis = 500.0 * np.column_stack([np.cos(angles), np.sin(angles), 0.0 * angles])
@@ -144,6 +156,8 @@ def test_a_bent_member_is_cut_to_its_arc(tslot: MountPlan) -> None:
 def test_joints_say_where_to_mark_the_member(tslot: MountPlan) -> None:
     table = {row["joint"]: row for row in rows(joints_csv(tslot))}
     assert table["joint-c1"]["along_mm"] == "560.0" and table["joint-c1"]["angle_deg"] == ""
+    on = {member.id: member.start for member in tslot.structure.members}
+    assert table["joint-c1"]["along_from"] == on[table["joint-c1"]["on"]] == "lower end"
     assert table["joint-c1"]["fasteners"] == "2xcap-screw-m5; 2xt-nut-2020"
     document = json.loads(joints_json(tslot))["joints"]
     assert [j["joint"] for j in document] == list(table)
