@@ -179,6 +179,7 @@ class Bracket(Part):
 
     series: tuple[str, ...]
     size_mm: SizeOf | None = None
+    leg_mm: float | None = None
     bolt: str | None = None
     bolts: int | None = None
     angle_deg: PairOf | None = None

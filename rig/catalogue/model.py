@@ -214,12 +214,16 @@ class ProfileEntry(Entry):
 class BracketEntry(Entry):
     """A bracket or joint."""
 
-    kind: Literal["corner", "pivot", "head-plate", "clamp", "stand"] = Field(
-        description="Kind of bracket; a stand carries a head over the floor."
+    kind: Literal["corner", "pivot", "head-plate", "clamp", "stand", "end-cap"] = Field(
+        description="Kind of bracket; a stand carries a head over the floor, an end cap closes a "
+        "profile."
     )
     series: list[Words] = Field(description="Profile series it fits.")
     size_mm: Vector | None = Field(
         default=None, description="Width, height and depth; of a stand at its full height."
+    )
+    leg_mm: Positive | None = Field(
+        default=None, description="Thickness of what its screws go through; 4 where not known."
     )
     bolt: Words | None = Field(default=None, description="Bolts it takes.")
     bolts: Annotated[int, Field(ge=1, le=100)] | None = Field(default=None, description="How many.")
@@ -232,7 +236,7 @@ class BracketEntry(Entry):
 
 
 class FastenerEntry(Entry):
-    """A screw, nut, stud, or an adapter from one thread to another."""
+    """A screw, nut or stud, or an adapter from one thread to another."""
 
     kind: Literal["cap-screw", "hex-nut", "stud", "t-nut", "adapter"] = Field(
         description="Kind of fastener."

@@ -13,7 +13,7 @@ from rig.build.folder.planfolder import write_plan
 from rig.build.mounts.making import make_plan
 from rig.build.mounts.plan import Clash, Figures, MountPlan, Price, Sag, Tolerance
 from rig.build.mounts.settings import CameraMount
-from rig.build.parts import Prices, must_be_known
+from rig.build.parts import Prices, Stock, must_be_known
 from rig.catalogue import load_catalogue
 from rig.design.designfile import read_design
 from service.jobs.engine import Running, Task
@@ -66,6 +66,7 @@ def plan(task: Task[PlanRequest, PlanResult], running: Running) -> PlanResult:
         occluder=subject.occluder,
         paper=request.paper,
         step=request.step,
+        stock=Stock(request.mount.bar_mm, request.mount.kerf_mm),
     )
     writing = between(running.report, _WRITING, 1.0)
     write_plan(made, task.folder, options, progress=writing, cancel=running.cancel)

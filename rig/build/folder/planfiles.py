@@ -15,6 +15,7 @@ from rig.build.mounts.plan import MountPlan
 from rig.build.mounts.planfile import plan_document
 from rig.build.mounts.structure import Plate
 from rig.build.page.planscene import plan_glb
+from rig.build.parts.screws import Tap, taps
 from rig.catalogue import Catalogue, load_catalogue
 from rig.report.designfolder import json_text
 
@@ -56,7 +57,8 @@ class PlanOptions:
     """What else the files are made from.
 
     ``occluder``: the subject, for the page and the scene. ``paper`` of templates: A4 or A3.
-    ``step``: wedges as STEP too, with the extra ``cad``.
+    ``step``: wedges as STEP too, with the extra ``cad``. ``stock``: the bars that pieces are sawn
+    from.
     """
 
     catalogue: Catalogue = field(default_factory=load_catalogue)
@@ -64,6 +66,7 @@ class PlanOptions:
     occluder: Occluder | None = None
     paper: str = "A4"
     step: bool = False
+    stock: parts.Stock = field(default_factory=parts.Stock)
 
 
 class _Making:
@@ -94,6 +97,14 @@ class _Making:
     @cached_property
     def cuts(self) -> tuple[parts.Cut, ...]:
         return parts.cut_list(self.plan, self.options.catalogue)
+
+    @cached_property
+    def bars(self) -> tuple[parts.Bar, ...]:
+        return parts.stock_bars(self.plan, self.options.stock)
+
+    @cached_property
+    def taps(self) -> tuple[Tap, ...]:
+        return taps(self.plan.structure, self.options.catalogue)
 
     def printed(self, index: int) -> tuple[wedges.PrintPart, trimesh.Trimesh]:
         """Recipe and mesh of a wedge."""
@@ -136,6 +147,10 @@ def _lists(making: _Making) -> Iterable[PlanFile]:
         "parts/bill.json": ("bill of materials", lambda: parts.bill_json(making.bill)),
         "parts/cuts.csv": ("cut list", lambda: parts.cuts_csv(making.cuts)),
         "parts/cuts.json": ("cut list", lambda: parts.cuts_json(making.cuts)),
+        "parts/stock.csv": ("from which bars to saw", lambda: parts.stock_csv(making.bars)),
+        "parts/stock.json": ("from which bars to saw", lambda: parts.stock_json(making.bars)),
+        "parts/taps.csv": ("bores to tap", lambda: parts.taps_csv(making.taps)),
+        "parts/taps.json": ("bores to tap", lambda: parts.taps_json(making.taps)),
         "parts/joints.csv": ("where joints are marked", lambda: parts.joints_csv(plan)),
         "parts/joints.json": ("where joints are marked", lambda: parts.joints_json(plan)),
         "settings/settings.csv": ("all settings", lambda: drawings.settings_csv(plan)),

@@ -102,6 +102,10 @@ class SystemFile(StrictModel):
     prices: dict[str, float] = Field(
         default_factory=dict, description="Price of a part by its catalogue id; profiles per metre."
     )
+    bar_mm: float = Field(
+        default=3000.0, gt=100.0, le=20_000.0, description="Length of the bars that are bought."
+    )
+    kerf_mm: float = Field(default=3.0, ge=0.0, le=20.0, description="What a cut of the saw takes.")
     camera_kg: float = Field(
         default=0.5, gt=0.0, le=20.0,
         description="Mass of a camera with its lens, where the catalogue does not say it.",

@@ -15,6 +15,7 @@ from geometry.arrays import Floats
 from geometry.camera import RigCamera
 from rig.build.mounts.plan import MountPlan
 from rig.build.mounts.structure import Plate
+from rig.build.parts.screws import end_caps, screw_mm
 from rig.catalogue.catalogue import Catalogue
 
 PRINT_DENSITY_G_PER_CM3 = 1.27
@@ -34,6 +35,9 @@ DENSITIES_G_PER_CM3: Mapping[str, float] = {
 """Usual densities; a material is looked up by its first word."""
 
 METRE_MM = 1000.0
+Sized = tuple[str, float | None]
+"""A part and, of a screw, its length."""
+
 KINDS = ("camera", "lens", "mount", "head", "profile", "bracket", "fastener")
 
 
@@ -222,20 +226,26 @@ def _profiles(plan: MountPlan, catalogue: Catalogue, prices: Prices) -> list[Bil
 
 
 def _pieces(plan: MountPlan, catalogue: Catalogue, prices: Prices) -> list[BillLine]:
-    """Placed parts, and what joints are made with: brackets, screws, nuts."""
-    counts = Counter(part.part for part in plan.structure.parts)
+    """Placed parts, what joints are made with, and the caps of open ends; screws by length."""
+    counts: Counter[Sized] = Counter((part.part, None) for part in plan.structure.parts)
     for joint in plan.structure.joints:
-        counts.update(joint.fasteners)
+        length = screw_mm(joint, plan.structure, catalogue)
+        for part, count in joint.fasteners.items():
+            screw = catalogue.find(part)[1].kind in ("cap-screw", "stud")
+            counts[part, length if screw else None] += count
+    for part, count in end_caps(plan.structure, catalogue).items():
+        counts[part, None] += count
     return _counted(counts, catalogue, prices)
 
 
-def _counted(counts: Counter[str], catalogue: Catalogue, prices: Prices) -> list[BillLine]:
+def _counted(counts: Counter[Sized], catalogue: Catalogue, prices: Prices) -> list[BillLine]:
     lines = []
-    for wanted, count in counts.items():
+    for (wanted, length), count in counts.items():
         kind, part = catalogue.find(wanted)
         mass: Any = getattr(part, "mass_g", None)
-        lines.append(_line(kind, (part.id, part.name, part.maker), count, mass, prices))
-    return sorted(lines, key=lambda line: (KINDS.index(line.kind), line.part))
+        name = part.name if length is None else f"{part.name} × {length:g} mm"
+        lines.append(_line(kind, (part.id, name, part.maker), count, mass, prices))
+    return sorted(lines, key=lambda line: (KINDS.index(line.kind), line.part, line.name))
 
 
 def _plate_line(plate: Plate, prices: Prices) -> BillLine:

@@ -63,7 +63,8 @@ def _number(value: float | None, decimals: int) -> float | None:
     return None if value is None else round(value, decimals)
 
 
-def _csv(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+def as_csv(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    """Rows under a header."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(columns)
@@ -77,7 +78,8 @@ def _harmless(cell: object) -> object:
     return f" {cell}" if formula else cell
 
 
-def _json(document: dict[str, Any]) -> str:
+def as_json(document: dict[str, Any]) -> str:
+    """A document as strict JSON."""
     return json.dumps(document, allow_nan=False, ensure_ascii=False, indent=1) + "\n"
 
 
@@ -99,7 +101,7 @@ def bill_csv(bill: Bill) -> str:
         )
         for line in bill.lines
     )
-    return _csv(BILL_COLUMNS, rows)
+    return as_csv(BILL_COLUMNS, rows)
 
 
 def bill_json(bill: Bill) -> str:
@@ -126,7 +128,7 @@ def bill_json(bill: Bill) -> str:
         "without_mass": list(bill.without_mass),
         "without_price": list(bill.without_price),
     }
-    return _json({"schema": "rigwright.bill/1", "lines": lines, "total": total})
+    return as_json({"schema": "rigwright.bill/1", "lines": lines, "total": total})
 
 
 def cuts_csv(cuts: tuple[Cut, ...]) -> str:
@@ -147,7 +149,7 @@ def cuts_csv(cuts: tuple[Cut, ...]) -> str:
         )
         for cut in cuts
     )
-    return _csv(CUT_COLUMNS, rows)
+    return as_csv(CUT_COLUMNS, rows)
 
 
 def cuts_json(cuts: tuple[Cut, ...]) -> str:
@@ -168,7 +170,7 @@ def cuts_json(cuts: tuple[Cut, ...]) -> str:
         }
         for cut in cuts
     ]
-    return _json({"schema": "rigwright.cuts/1", "cuts": document})
+    return as_json({"schema": "rigwright.cuts/1", "cuts": document})
 
 
 def joints_csv(plan: MountPlan) -> str:
@@ -190,7 +192,7 @@ def joints_csv(plan: MountPlan) -> str:
         )
         for joint in plan.structure.joints
     )
-    return _csv(JOINT_COLUMNS, rows)
+    return as_csv(JOINT_COLUMNS, rows)
 
 
 def joints_json(plan: MountPlan) -> str:
@@ -209,4 +211,4 @@ def joints_json(plan: MountPlan) -> str:
         }
         for joint in plan.structure.joints
     ]
-    return _json({"schema": "rigwright.joints/1", "joints": document})
+    return as_json({"schema": "rigwright.joints/1", "joints": document})

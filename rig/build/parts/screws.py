@@ -1,0 +1,124 @@
+"""How long each screw must be, from what it goes through, and which bores are tapped for it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from rig.build.mounts.structure import Joint, Member, Structure
+from rig.catalogue import Catalogue
+from rig.catalogue.items import Bracket
+
+LENGTHS_MM = (6, 8, 10, 12, 16, 20, 25, 30, 35, 40, 45, 50, 55, 60, 70, 80, 90, 100, 120)
+"""Lengths that socket cap screws are sold in, ISO 4762."""
+
+IN_NUT = 0.8
+"""What a screw must have in a nut, in diameters: the height of a nut, ISO 4032, is that."""
+
+IN_ALUMINIUM = 2.0
+"""The same in a thread that is cut into aluminium."""
+
+LEG_MM = 4.0
+"""Thickness of a corner bracket's or pivot's leg where the catalogue does not say."""
+
+UNDER_HEAD_MM = 6.0
+"""What a printed wedge has under the heads of its screws."""
+
+CAMERA_SCREW_MM = 12.0
+"""Of the screw into a camera: 6 mm in the wedge, 6 mm in the camera."""
+
+BEYOND_MM = 4.0
+"""How much deeper a bore is tapped than its screw reaches: the tap's lead."""
+
+
+@dataclass(frozen=True)
+class Tap:
+    """A bore to tap: ``bores`` core bores at the ``end`` of a member, ``depth_mm`` deep."""
+
+    member: str
+    end: str
+    bores: int
+    thread: str
+    depth_mm: float
+
+
+def screw_mm(joint: Joint, structure: Structure, catalogue: Catalogue) -> float | None:
+    """Length of a joint's screws; None where it has none, or what they go through is not known."""
+    screw = next((part for part in map(catalogue.fasteners.get, joint.fasteners)
+                  if part is not None and part.kind in ("cap-screw", "stud")), None)  # fmt: skip
+    if screw is None or screw.diameter_mm is None:
+        return None
+    wedges = {wedge.id for wedge in structure.wedges}
+    if joint.on in wedges:
+        return CAMERA_SCREW_MM
+    through = _through_mm(joint, structure, catalogue)
+    if through is None:
+        return None
+    held = IN_ALUMINIUM if _tapped(joint, structure, catalogue) else IN_NUT
+    wanted = through + held * screw.diameter_mm
+    return float(next((length for length in LENGTHS_MM if length >= wanted - 1e-9), wanted))
+
+
+def taps(structure: Structure, catalogue: Catalogue) -> tuple[Tap, ...]:
+    """Every bore that screws through a plate are screwed into."""
+    members = {member.id: member for member in structure.members}
+    found = []
+    for joint in structure.joints:
+        member = members.get(joint.other)
+        length = screw_mm(joint, structure, catalogue)
+        through = _through_mm(joint, structure, catalogue)
+        if member is None or length is None or not _tapped(joint, structure, catalogue):
+            continue
+        depth = length - (through or 0.0) + BEYOND_MM
+        bores = sum(n for part, n in joint.fasteners.items() if part in catalogue.fasteners)
+        thread = next(catalogue.fasteners[part].thread for part in joint.fasteners
+                      if part in catalogue.fasteners)  # fmt: skip
+        found.append(Tap(member.id, member.start, bores, thread, depth))
+    return tuple(found)
+
+
+def end_caps(structure: Structure, catalogue: Catalogue) -> dict[str, int]:
+    """How many caps the open ends of members take, by catalogue id.
+
+    An end that is screwed to a plate, or mitred to another member, is closed.
+    """
+    closed = {tap.member for tap in taps(structure, catalogue)}
+    counts: dict[str, int] = {}
+    for member in structure.members:
+        cap = _cap(member, catalogue)
+        if cap is not None:
+            open_ends = sum(mitre == 0.0 for mitre in member.mitres_deg) - (member.id in closed)
+            counts[cap.id] = counts.get(cap.id, 0) + open_ends
+    return {part: count for part, count in counts.items() if count}
+
+
+def _cap(member: Member, catalogue: Catalogue) -> Bracket | None:
+    profile = catalogue.profiles.get(member.part)
+    if profile is None:
+        return None
+    return next((part for part in catalogue.brackets.values()
+                 if part.kind == "end-cap" and profile.series in part.series), None)  # fmt: skip
+
+
+def _tapped(joint: Joint, structure: Structure, catalogue: Catalogue) -> bool:
+    """Whether screws go into a member's own bores: through a plate, without nuts."""
+    nuts = [p for p in map(catalogue.fasteners.get, joint.fasteners) if p and "nut" in p.kind]
+    return not nuts and joint.on in {plate.id for plate in structure.plates}
+
+
+def _through_mm(joint: Joint, structure: Structure, catalogue: Catalogue) -> float | None:
+    """What lies between a screw's head and its thread."""
+    brackets = [b for b in map(catalogue.brackets.get, joint.fasteners) if b is not None]
+    if brackets:
+        return _leg_mm(brackets[0])
+    for plate in structure.plates:
+        if plate.id in (joint.on, joint.other):
+            return plate.thickness_mm
+    if joint.other in {wedge.id for wedge in structure.wedges}:
+        return UNDER_HEAD_MM
+    placed = {part.id: part.part for part in structure.parts}
+    bracket = catalogue.brackets.get(placed.get(joint.other, ""))
+    return None if bracket is None or bracket.size_mm is None else bracket.size_mm[2]
+
+
+def _leg_mm(bracket: Bracket) -> float:
+    return LEG_MM if bracket.leg_mm is None else bracket.leg_mm
