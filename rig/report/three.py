@@ -46,8 +46,12 @@ def lines_trace(
     return go.Scatter3d(x=x, y=y, z=z, mode="lines", line=line, name=name, hoverinfo="skip", **more)
 
 
-def scene_layout(zoom: float, *, axes: bool = True, aim_z: float = -0.08) -> dict[str, Any]:
+def scene_layout(
+    zoom: float, *, axes: bool = True, aim_z: float = -0.08, behind: bool = True
+) -> dict[str, Any]:
     """A scene in true proportion, seen from the cameras' side.
+
+    From the subject's side where not ``behind``.
 
     ``aim_z`` is the height the viewer looks at, in units of the scene's box.
     """
@@ -59,7 +63,7 @@ def scene_layout(zoom: float, *, axes: bool = True, aim_z: float = -0.08) -> dic
         "nticks": 6,
         "visible": axes,
     }
-    look = np.array([-0.9, -1.45, 0.45]) / zoom
+    look = np.array([-0.9, -1.45, 0.45] if behind else [-1.3, 1.1, 0.45]) / zoom
     return {
         "scene": {
             "aspectmode": "data",

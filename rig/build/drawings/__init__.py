@@ -1,6 +1,7 @@
 """Drawings of a mount plan: views, plates, templates and setting sheets, as DXF, SVG and PDF."""
 
 from rig.build.drawings.dxf import dxf_bytes
+from rig.build.drawings.isometric import isometric_sheets
 from rig.build.drawings.items import Sheet
 from rig.build.drawings.lists import poses_csv, settings_csv, tapes_csv
 from rig.build.drawings.pdf import pdf_bytes
@@ -12,6 +13,7 @@ from rig.build.drawings.templates import template_pages, template_sheet
 from rig.build.drawings.views import view_sheets
 
 __all__ = [
+    "isometric_sheets",
     "Sheet",
     "dxf_bytes",
     "pdf_bytes",

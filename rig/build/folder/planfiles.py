@@ -83,6 +83,10 @@ class _Making:
         return drawings.view_sheets(self.plan, occluder.vertices_mm if occluder and seen else None)
 
     @cached_property
+    def isometric(self) -> tuple[Sheet, ...]:
+        return drawings.isometric_sheets(self.plan, self.bill.lines)
+
+    @cached_property
     def settings(self) -> tuple[Sheet, ...]:
         return drawings.setting_sheets(self.plan)
 
@@ -177,6 +181,8 @@ def _sheets(
 def _drawn(making: _Making) -> Iterable[PlanFile]:
     words = "front, top and side, cameras, members, joints"
     yield from _sheets("drawings/views", words, making.plan.name, lambda: making.views)
+    words = "the rig with balloons that number it as the bill does"
+    yield from _sheets("drawings/isometric", words, making.plan.name, lambda: making.isometric)
 
 
 def _plates(making: _Making) -> Iterable[PlanFile]:

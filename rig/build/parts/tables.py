@@ -24,6 +24,7 @@ BILL_COLUMNS = (
     "cost",
     "currency",
     "note",
+    "number",
 )
 CUT_COLUMNS = (
     "part",
@@ -98,8 +99,9 @@ def bill_csv(bill: Bill) -> str:
             _figure(line.cost, 2),
             bill.currency if line.cost is not None else "",
             line.note,
+            number,
         )
-        for line in bill.lines
+        for number, line in enumerate(bill.lines, 1)
     )
     return as_csv(BILL_COLUMNS, rows)
 
@@ -118,8 +120,9 @@ def bill_json(bill: Bill) -> str:
             "price": _number(line.price, 2),
             "cost": _number(line.cost, 2),
             "note": line.note,
+            "number": number,
         }
-        for line in bill.lines
+        for number, line in enumerate(bill.lines, 1)
     ]
     total = {
         "mass_g": round(bill.mass_g, 1),

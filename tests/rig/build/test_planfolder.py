@@ -48,6 +48,9 @@ def test_a_folder_holds_every_file_and_a_true_manifest(tmp_path: Path) -> None:
         "settings/settings.pdf",
         "settings/sheet-left.dxf",
         "parts/bill.csv",
+        "parts/stock.csv",
+        "parts/taps.json",
+        "drawings/isometric.pdf",
         "brackets/wedge-top.3mf",
     ):
         assert wanted in there
