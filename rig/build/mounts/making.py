@@ -217,8 +217,9 @@ def make_plan(
     around = spec.surroundings(subject, limits, standing)
     _must_stand(free, around)
     _must_fit(free, around)
-    for camera in free if spec.system.head is not None else ():
-        spec.system.head.must_carry(camera, spec.masses.of_camera(camera))
+    if (head := spec.system.head) is not None:
+        for camera in free:
+            head.must_carry(camera, spec.masses.of_camera(camera))
     stiff = job.stiff(spec, free, around)
     naive = tuple(nearest(mount) for mount in stiff.first.mounts)
     roomy, spare = job.relaxed(spec)
