@@ -7,24 +7,20 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from rigs import face, face_cameras, face_limits
+from held_mounts import held
 
 from rig.build.mounts.shapes import ConvexShape, gap_mm
 from rig.build.mounts.steps import assembly_steps
 from rig.build.mounts.structure import Member
-from rig.build.mounts.surroundings import Surroundings
-from rig.build.mounts.systemfile import system_from_mapping
 from rig.build.mounts.systems.base import Built
 from rig.build.statics.framing import nearest_along
 
-AROUND = Surroundings(face(), face_limits(), (), -1200.0, 2.0)
 KINDS = ("t-slot", "arc", "plate")
 
 
 @cache
 def built(kind: str) -> Built:
-    system = system_from_mapping({"kind": kind}).system
-    return system.hold(face_cameras(face(), 4), AROUND).with_stays().build()
+    return held(kind).with_stays().build()
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -7,29 +7,26 @@ from functools import cache
 
 import numpy as np
 import pytest
+from held_mounts import AROUND, four_cameras, held
 from plans import tslot_plan
-from rigs import face, face_cameras, face_limits
+from rigs import face, face_limits
 
 from common.errors import InputError
 from rig.build.mounts.making import figures
 from rig.build.mounts.plan import MountPlan, Price
 from rig.build.mounts.structure import Member
-from rig.build.mounts.surroundings import Surroundings
-from rig.build.mounts.systemfile import system_from_mapping
 from rig.build.parts import Stock, bill_of_materials, stock_bars
 from rig.build.parts.screws import end_caps, screw_mm, taps
 from rig.catalogue import load_catalogue
 from solver.quality import evaluate
 
 CATALOGUE = load_catalogue()
-AROUND = Surroundings(face(), face_limits(), (), -1200.0, 2.0)
 
 
 @cache
 def plan(kind: str) -> MountPlan:
-    cameras = face_cameras(face(), 2)
-    built = system_from_mapping({"kind": kind}).system.hold(cameras, AROUND).build()
-    now = figures(evaluate(face(), cameras, face_limits()))
+    built = held(kind).build()
+    now = figures(evaluate(face(), four_cameras(), face_limits()))
     return MountPlan(
         "rig", kind, AROUND.datum_mm, built.structure, built.mounts, Price(now, now, now), (), (),
         1.0, 1,

@@ -3,59 +3,43 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import plan_readers as read
 import pytest
+from held_mounts import AROUND, four_cameras, held
 from plans import tslot_plan
-from rigs import face, face_cameras, face_limits
 
 from common.errors import InputError
-from geometry.camera import RigCamera
 from rig.build.drawings import pdf_bytes, setting_sheets, settings_csv
 from rig.build.mounts.clashes import find_clashes
 from rig.build.mounts.making import SystemSpec
 from rig.build.mounts.plan import Give, MountPlan, Sag
 from rig.build.mounts.planfile import plan_document, plan_from_mapping
-from rig.build.mounts.surroundings import Surroundings
 from rig.build.mounts.systemfile import system_from_mapping
-from rig.build.mounts.systems.base import Holding
 from rig.build.page.stiffness import stiffness
 from rig.build.statics.sag import Masses, sags
 from rig.build.statics.stiffening import advice, settled_sags, stiffened
 from rig.catalogue import load_catalogue
 
 CATALOGUE = load_catalogue()
-AROUND = Surroundings(face(), face_limits(), (), -1200.0, 2.0)
-
-
-@cache
-def cameras() -> tuple[RigCamera, ...]:
-    return face_cameras(face(), 4)
 
 
 def spec(kind: str, **keys: object) -> SystemSpec:
     return system_from_mapping({"kind": kind, **keys})
 
 
-@cache
-def held(kind: str) -> Holding:
-    """As first arranged, of the default profile."""
-    return spec(kind).system.hold(cameras(), AROUND)
-
-
 def leans(kind: str, **keys: object) -> tuple[float, float, tuple[str, ...]]:
     """The worst lean as first arranged and as stiffened, and what is told."""
     asked, plain = spec(kind, **keys), held(kind).build()
-    mended = stiffened(asked.system, asked.larger, cameras(), AROUND, asked.masses)
+    mended = stiffened(asked.system, asked.larger, four_cameras(), AROUND, asked.masses)
     built = mended.first.build()
     found = [sags(b.structure, b.mounts, (), asked.masses) for b in (plain, built)]
     before, after = (max(sag.lean_deg for sag in each) for each in found)
     return before, after, mended.notes
 
 
-@pytest.mark.parametrize(("kind", "camera_kg"), [("t-slot", 0.25), ("t-slot", 1.0), ("arc", 1.0)])
+@pytest.mark.parametrize(("kind", "camera_kg"), [("t-slot", 1.0), ("arc", 0.25)])
 def test_cameras_lean_less_than_half_a_step_of_their_heads(kind: str, camera_kg: float) -> None:
     before, after, notes = leans(kind, camera_kg=camera_kg)
     assert after < 0.5
@@ -74,7 +58,7 @@ def test_a_profile_that_was_asked_for_stays_and_one_is_named_that_would_do() -> 
 
 
 def test_stays_touch_nothing_and_stand_on_their_sill() -> None:
-    for kind in ("t-slot", "arc", "plate"):
+    for kind in ("t-slot", "arc"):
         built = held(kind).with_stays().build()
         stays = {m.id for m in built.structure.members if m.role in ("stay", "sill")}
         assert len(stays) > 1
