@@ -39,7 +39,9 @@ def brute_gap(one: ConvexShape, other: ConvexShape) -> tuple[float, float]:
         apart, start, bounds=[(0.0, 1.0)] * len(start), constraints=sums, method="SLSQP",
         options={"maxiter": 400, "ftol": 1e-12},
     )  # fmt: skip
-    between = found.x[len(a) :] @ b - found.x[: len(a)] @ a
+    # The solver keeps sums and signs to its own tolerance: points outside the hulls bound nothing.
+    u, v = (np.clip(w, 0.0, None) for w in (found.x[: len(a)], found.x[len(a) :]))
+    between = v / v.sum() @ b - u / u.sum() @ a
     far = float(np.linalg.norm(between))
     along = between / far
     return float((b @ along).min() - (a @ along).max()), far
