@@ -35,6 +35,7 @@ from solver.coverage.views import (
 from solver.coverage.visibility import cast_rays
 from solver.formulation import (
     COVERAGE,
+    SATISFIED,
     Merit,
     candidate_constraints,
     cost_scale,
@@ -206,8 +207,10 @@ def run_near(problem: Problem, report: Report, cancel: CancelToken) -> StartResu
                 why = f"another move gained less than {_SETTLED:g} of the cost"
                 break
         else:
+            # What a longer move brings into view may be more than a shorter one can keep sharp.
+            hopeless = trial.violation > SATISFIED
             held = _Held(
-                held.framed | found.seen.framed,
+                best.seen.framed if hopeless else held.framed | found.seen.framed,
                 np.union1d(held.added_points, found.judged.missed),
                 held.cuts.joined(lost),
                 problem.count,

@@ -15,10 +15,12 @@ from hypothesis import strategies as st
 
 from common.progress import NeverCancelled
 from solver import near_optimum
+from solver.coverage.cuts import VisibilityCuts
 from solver.coverage.views import NEAR, judge
 from solver.formulation import Merit, unknown_bounds
 from solver.limits import BaseHeight, Coverage, CoverageTier, PoseBounds
 from solver.near_optimum import FIRST_BOX, LARGEST_BOX, MAX_MOVES, run_near
+from solver.nlp.sqp import Outcome
 from solver.outer_loop import StartResult
 from solver.problem import Problem
 from solver.quality import evaluate
@@ -195,3 +197,34 @@ def test_no_move_reaches_beyond_its_box(monkeypatch: pytest.MonkeyPatch) -> None
         assert after == pytest.approx(min(1.5 * before, LARGEST_BOX)) or after == pytest.approx(
             0.4 * before
         )
+
+
+def test_what_a_failed_solve_could_not_frame_is_not_held_on_to(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    problem, told = problem_of(), []
+    start = problem.start_values()
+    bounds = unknown_bounds(problem, start)
+    begin = near_optimum._looked_at(problem, start, bounds)
+    worse = replace(
+        begin,
+        seen=replace(begin.seen, framed=np.ones_like(begin.seen.framed)),
+        merit=Merit(1.0, 0.0, 2.0 * begin.merit.cost),
+    )
+    looks = iter((begin, *[worse] * MAX_MOVES))
+    violations = iter((0.0, 1e-2, *[0.0] * MAX_MOVES))
+
+    def moved(_problem: Problem, _best: object, held: near_optimum._Held, *_: object) -> object:
+        told.append(held)
+        outcome = Outcome(start, [], 1.0, next(violations), 1, False, False, "")
+        return outcome, VisibilityCuts.none()
+
+    monkeypatch.setattr(near_optimum, "_looked_at", lambda *_: next(looks))
+    monkeypatch.setattr(near_optimum, "_moved", moved)
+    run_near(problem, lambda *_: None, NEVER)
+    framed = [held.framed for held in told[:3]]
+    np.testing.assert_array_equal(framed[0], begin.seen.framed)
+    assert framed[1].all()
+    np.testing.assert_array_equal(framed[2], begin.seen.framed)
+    # After a failure every view is held, not only those of points that have few.
+    assert [held.views for held in told[:2]] == [2, problem.count]
