@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from common.errors import InputError
 from evaluation.comparison.alignment import Alignment, best_fit, unaligned
 from evaluation.comparison.distances import Reference, signed_distances
-from geometry.arrays import Floats
+from geometry.arrays import Bools, Floats
 
 PERCENTILES = (50.0, 68.3, 95.0, 99.0, 99.9)
 REACHES_MM = (0.1, 0.2, 0.3, 0.5, 1.0)
@@ -57,12 +57,16 @@ class Figures:
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """The figures, the alignment they stand on, and the distance of each compared point."""
+    """The figures, the alignment they stand on, and the distance of each compared point.
+
+    ``kept`` tells which points of the cloud (those in the region, where there is one) they are.
+    """
 
     figures: Figures
     alignment: Alignment
     points_mm: Floats
     distances_mm: Floats
+    kept: Bools
 
 
 def compare(
@@ -72,11 +76,14 @@ def compare(
     align: str = "none",
     within: Within | None = None,
     limit_mm: float = 5.0,
+    places_mm: Floats | None = None,
 ) -> Comparison:
     """Compare a cloud (N, 3) with a reference in the same unit.
 
     ``align``: ``none``, ``best-fit`` or ``best-fit-scale``. Points farther than ``limit_mm`` are
     of something else than the reference: they are counted as ``left_out`` and nowhere else.
+    ``places_mm`` (M, 3), spread evenly over the reference, are asked for completeness; without
+    them the whole reference within the region.
     Raises :class:`InputError` where no point lies near the reference.
     """
     alignment = _aligned(points_mm, reference, align)
@@ -93,8 +100,9 @@ def compare(
             f"no point of the cloud lies within {limit_mm:g} mm of the reference",
             "check that both are in millimetres and in one frame, or align them (--align best-fit)",
         )
-    figures = _figures(moved[near], distances[near], int((~near).sum()), reference, within)
-    return Comparison(figures, alignment, moved[near], distances[near])
+    places = _places(reference, within) if places_mm is None else places_mm
+    figures = _figures(moved[near], distances[near], int((~near).sum()), places)
+    return Comparison(figures, alignment, moved[near], distances[near], near)
 
 
 def _aligned(points_mm: Floats, reference: Reference, align: str) -> Alignment:
@@ -105,15 +113,17 @@ def _aligned(points_mm: Floats, reference: Reference, align: str) -> Alignment:
     raise InputError("align", f"there is no alignment {align!r}", "give none or best-fit")
 
 
-def _figures(
-    points: Floats, distances: Floats, left_out: int, reference: Reference, within: Within | None
-) -> Figures:
-    absolute = np.abs(distances)
+def _places(reference: Reference, within: Within | None) -> Floats:
     places = reference.samples(SAMPLE_MM)
     if within is not None:
         places = places[within.of(places)]
     if len(places) == 0:
         raise InputError("compare-empty", "the region holds nothing of the reference", "widen it")
+    return places
+
+
+def _figures(points: Floats, distances: Floats, left_out: int, places: Floats) -> Figures:
+    absolute = np.abs(distances)
     # Bounded: places that nothing is near would search the whole tree.
     gaps, _ = cKDTree(points).query(places, distance_upper_bound=2.0 * REACHES_MM[-1])
     reached = tuple((r, float(100.0 * np.mean(gaps <= r))) for r in REACHES_MM)

@@ -43,7 +43,14 @@ class Reference:
         return np.asarray(np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2.0)
 
     def samples(self, spacing_mm: float, seed: int = 0) -> Floats:
-        """Points (M, 3) spread evenly over the surface, one for each ``spacing_mm`` squared."""
+        """The points of :meth:`sampled`."""
+        return self.sampled(spacing_mm, seed)[0]
+
+    def sampled(self, spacing_mm: float, seed: int = 0) -> tuple[Floats, Ints]:
+        """Points (M, 3) spread evenly over the surface, and the face of each (M,).
+
+        One for each ``spacing_mm`` squared.
+        """
         area = self.areas_mm2()
         count = max(1, int(area.sum() / spacing_mm**2))
         rng = np.random.default_rng(seed)
@@ -52,7 +59,7 @@ class Reference:
         flip = u + v > 1.0
         u, v = np.where(flip, 1.0 - u, u), np.where(flip, 1.0 - v, v)
         a, b, c = (self.vertices_mm[self.faces[face, k]] for k in range(3))
-        return np.asarray(a + u[:, None] * (b - a) + v[:, None] * (c - a))
+        return np.asarray(a + u[:, None] * (b - a) + v[:, None] * (c - a)), face
 
 
 def signed_distances(points_mm: Floats, reference: Reference) -> tuple[Floats, Floats]:

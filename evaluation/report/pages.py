@@ -63,7 +63,7 @@ def reconstruction_page(
         header=header,
         main=main,
         footer="",
-        style=style_sheet() + _STYLE,
+        style=style_sheet() + STYLE,
         figures='{"figure": ' + figure + "}",
         script=files("evaluation.report").joinpath("surface.js").read_text(encoding="utf-8"),
         view={"points": len(cloud), "faces": len(shown.faces)},
@@ -72,6 +72,16 @@ def reconstruction_page(
 
 def comparison_page(done: Comparison, title: str, scale_mm: float) -> str:
     """The distances from three sides, blue to red, their histogram and all figures."""
+    f = done.figures
+    body = (
+        f"<header><h1>{esc(title)}</h1><p>rms {f.rms_mm:.3f} mm over {f.points:,} points.</p>"
+        f"</header><main>{comparison_sections(done, scale_mm)}</main>"
+    )
+    return still_page(title, body, style_sheet() + STYLE)
+
+
+def comparison_sections(done: Comparison, scale_mm: float) -> str:
+    """What a page tells of a comparison, as sections."""
     f = done.figures
     rows = [
         ["points", f"{f.points:,}"],
@@ -85,10 +95,8 @@ def comparison_page(done: Comparison, title: str, scale_mm: float) -> str:
         ["points per square millimetre", f"{f.points_per_mm2:.2f}"],
         ["alignment", f"{done.alignment.how}, scale {done.alignment.scale:.6f}"],
     ]
-    body = (
-        f"<header><h1>{esc(title)}</h1><p>rms {f.rms_mm:.3f} mm over {f.points:,} points.</p>"
-        "</header><main>"
-        + section(
+    return (
+        section(
             "distances",
             "Distance to the reference",
             f"Blue {scale_mm:g} mm inside, red {scale_mm:g} mm outside.",
@@ -96,9 +104,7 @@ def comparison_page(done: Comparison, title: str, scale_mm: float) -> str:
         )
         + section("histogram", "How they spread", "", _histogram(done.distances_mm, scale_mm))
         + section("figures", "Figures", "", text_table(["figure", "value"], rows))
-        + "</main>"
     )
-    return still_page(title, body, style_sheet() + _STYLE)
 
 
 def _three(points_mm: Floats, colours: NDArray[np.uint8]) -> str:
@@ -128,7 +134,7 @@ def _histogram(distances_mm: Floats, scale_mm: float) -> str:
     )
 
 
-_STYLE = """
+STYLE = """
 #surface-3d { height: 70vh; min-height: 420px; }
 .sides { display: flex; flex-wrap: wrap; gap: 1rem; }
 .sides figure { margin: 0; flex: 1 1 260px; max-width: 420px; }

@@ -83,6 +83,13 @@ def _comparison() -> Work[Any, Any]:
     return Work(COMPARISON, comparison)
 
 
+def _trial() -> Work[Any, Any]:
+    from service.kinds.trial import TRIAL
+    from service.tasks.trying import trial
+
+    return Work(TRIAL, trial)
+
+
 def _scan_import() -> Work[Any, Any]:
     from service.kinds.imports import SCAN_IMPORT
     from service.tasks.reading import import_scan
@@ -108,6 +115,7 @@ _WORK: dict[str, Callable[[], Work[Any, Any]]] = {
     "acceptance": _acceptance,
     "reconstruction": _reconstruction,
     "comparison": _comparison,
+    "trial": _trial,
     "scan-import": _scan_import,
     "picture-import": _pictures_import,
 }

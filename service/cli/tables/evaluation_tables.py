@@ -9,6 +9,7 @@ from rich.table import Table
 
 from service.kinds.comparison import ComparisonResult
 from service.kinds.reconstruction import ReconstructionResult
+from service.kinds.trial import TrialResult
 
 
 def print_reconstruction(result: ReconstructionResult) -> None:
@@ -41,6 +42,25 @@ def print_comparison(result: ComparisonResult) -> None:
         ("alignment", result.align + ("" if result.converged else ", NOT converged")),
     ]
     _print(("distances to the reference", ""), rows)
+
+
+def print_trial(result: TrialResult) -> None:
+    """The regions, predicted against measured, and the verdict."""
+    head = ("region", "points", "bias mm", "rms mm", "predicted mm", "measured mm", "ratio")
+    rows = [
+        (
+            r.region,
+            f"{r.points:,}",
+            f"{r.bias_mm:+.4f}",
+            f"{r.rms_mm:.4f}",
+            f"{r.predicted_mm:.4f}",
+            f"{r.measured_mm:.4f}",
+            f"{r.ratio:.2f}",
+        )
+        for r in result.regions
+    ]
+    _print(head, rows)
+    Console(highlight=False).print(result.verdict, markup=False)
 
 
 def _print(head: Sequence[str], rows: Sequence[Sequence[str]]) -> None:

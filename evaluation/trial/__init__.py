@@ -1,0 +1,1 @@
+"""Whether a rig measures a face: photographed, reconstructed and compared, all in the computer."""
