@@ -85,10 +85,12 @@ def test_views_of_an_empty_service(visits: tuple[Visit, Visit], view: str) -> No
 
 
 @pytest.mark.slow
-def test_the_page_works_behind_a_proxy(tmp_path: Path) -> None:
+def test_the_page_works_behind_a_proxy(visits: tuple[Visit, Visit], tmp_path: Path) -> None:
+    browser = visits[0].page.context.browser  # one at a time is all that a thread may have
+    assert browser is not None
     station = write_station(tmp_path / "rig")
     behind = served(tmp_path / "data", station, more=("--root-path", "/lab"))
-    with behind as address, chromium() as browser:
+    with behind as address:
         one = Visit(browser, f"{address}lab/")
         one.see("Trigger box: ready")
         one.press("Fire")
