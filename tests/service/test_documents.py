@@ -74,7 +74,7 @@ def test_a_store_of_the_first_version_is_brought_up_to_date(tmp_path: Path) -> N
         job = store.jobs.create(NewJob("count", {}), max_pending=9)
     with sqlite3.connect(tmp_path / "rigwright.sqlite3") as connection:
         connection.executescript(
-            "DROP TABLE job_inputs; DROP TABLE documents;"
+            "DROP TABLE job_inputs; DROP TABLE documents; DROP TABLE sign_ins;"
             "UPDATE alembic_version SET version_num = '0001'"
         )
     connection.close()
