@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
+from dataclasses import asdict, replace
 from pathlib import Path
 
 from common.errors import InputError
@@ -22,8 +22,6 @@ from service.kinds.trial import RegionPart, TrialRequest, TrialResult
 
 REACH_MM = 0.5
 """At which distance from a point the verdict asks for completeness."""
-
-_PLACING = ("units", "up", "front")
 
 
 def trial(task: Task[TrialRequest, TrialResult], running: Running) -> TrialResult:
@@ -62,12 +60,9 @@ def trial(task: Task[TrialRequest, TrialResult], running: Running) -> TrialResul
 def _head(task: Task[TrialRequest, TrialResult], design: ReadDesign) -> HeadSettings:
     """The head, placed as the design had it."""
     told = ScanOptions() if design.file.rig is None else design.file.rig.to_spec().scan_options
-    plain = ScanOptions()
-    other = [
-        f.name
-        for f in fields(ScanOptions)
-        if f.name not in (*_PLACING, "subject") and getattr(told, f.name) != getattr(plain, f.name)
-    ]
+    plain = asdict(ScanOptions())
+    unplaced = asdict(replace(told, units="auto", up="auto", front="auto", subject="head"))
+    other = [name for name, value in unplaced.items() if value != plain[name]]
     if other:
         raise InputError(
             "trial-scan",
@@ -80,7 +75,9 @@ def _head(task: Task[TrialRequest, TrialResult], design: ReadDesign) -> HeadSett
         displacement=task.inputs.get("displacement"),
         flip_texture=task.request.flip_texture,
         subdivisions=task.request.subdivisions,
-        **{name: getattr(told, name) for name in _PLACING},
+        units=told.units,
+        up=told.up,
+        front=told.front,
     )
 
 

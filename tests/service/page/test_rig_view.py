@@ -65,6 +65,7 @@ def test_a_countdown_can_be_stopped(visits: tuple[Visit, Visit], address: str) -
     assert len(read(f"{address}v1/captures")["items"]) == before  # type: ignore[index]
 
 
+@pytest.mark.slow
 def test_a_session_is_looked_at_and_proven(visits: tuple[Visit, Visit]) -> None:
     _, other = visits
     other.go("Sessions")
