@@ -260,6 +260,10 @@ COMMANDS = {
     "calibrate": ("calibrate", "pictures", "--targets", "set.toml"),
     "check": ("check", "pictures", "--reference", "cal.json", "--targets", "set.toml"),
     "accept": ("accept", "pictures", "--reference", "cal.json", "--targets", "set.toml"),
+    "reconstruct": ("reconstruct", "pictures", "--calibration", "cal.json"),
+    "compare": ("compare", "head.xyz", "--truth", "head.xyz"),
+    "trial": ("trial", "design.json", "--head", "head.xyz"),
+    "practice": ("practice",),
     "demo": ("demo",),
 }
 
