@@ -207,7 +207,7 @@ class JobResource(Generic[RequestT, ResultT]):
             f"{self.path}/{{job_id}}/{word}",
             name=f"read_{self._one}_{word}",
             response_class=StoredFile,
-            responses=problems(404, 409) | a_file(media_type, f"{file_name}."),
+            responses=problems(404, 409) | a_file(media_type, description=f"{file_name}."),
         )(endpoint)
 
     def file(self, service: Service, job_id: str, name: str) -> StoredFile:

@@ -11,7 +11,10 @@ BINARY = {"type": "string", "format": "binary"}
 """The schema of a file."""
 
 
-def a_file(media_type: str, description: str = "The file.") -> Responses:
-    """An answer that is a file."""
-    schema = {"type": "object"} if media_type == "application/json" else BINARY
-    return {200: {"description": description, "content": {media_type: {"schema": schema}}}}
+def a_file(*media_types: str, description: str = "The file.") -> Responses:
+    """An answer that is a file, of one of the media types."""
+    content = {
+        name: {"schema": {"type": "object"} if name == "application/json" else BINARY}
+        for name in media_types
+    }
+    return {200: {"description": description, "content": content}}

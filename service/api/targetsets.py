@@ -158,7 +158,7 @@ def read_target_set(service: ServiceDep, target_set_id: str) -> TargetSet:
 @router.get(
     PATH + "/{target_set_id}/file",
     response_class=Response,
-    responses=problems(404) | a_file("application/toml", "The target file."),
+    responses=problems(404) | a_file("application/toml", description="The target file."),
 )
 def read_target_file(service: ServiceDep, target_set_id: str) -> Response:
     """Fetch a target set as a target file (TOML)."""
@@ -187,7 +187,7 @@ def list_sheets(service: ServiceDep, target_set_id: str, page: Page = PAGE) -> S
 @router.get(
     PATH + "/{target_set_id}/sheets/{name}",
     response_class=Response,
-    responses=problems(404, 422) | a_file("application/pdf"),
+    responses=problems(404, 422) | a_file("application/pdf", "image/svg+xml", "image/png"),
 )
 def read_sheet(service: ServiceDep, target_set_id: str, name: str, page: Page = PAGE) -> Response:
     """Fetch a sheet to print (PDF, SVG), or a picture of a carrier for simulations (PNG)."""

@@ -24,7 +24,9 @@ from rig.acquisition.trigger.endpoint import Endpoint
 from rig.acquisition.trigger.faultscript import FaultRates, Incident, ProxyScript, Way
 from rig.acquisition.trigger.serialline import LINE_ERRORS
 
-_PARTIAL_S = 0.02
+_PARTIAL_S = 0.25
+"""A box on a busy computer sends a line in pieces; incidents are of whole lines."""
+
 _IDLE_S = 0.5
 _NOISE_BYTES = 60
 
