@@ -127,6 +127,9 @@ def _written(data: Path, sessions: Path, part: Path) -> Backup:
                     archive.writestr(name, content)
                 else:
                     archive.write(content, name)
+    # Renamed first and written later, a backup would be empty after a loss of power.
+    with part.open("rb") as written:
+        os.fsync(written.fileno())
     return Backup(len(hashes), len(folders), part.stat().st_size, tuple(damaged))
 
 

@@ -12,9 +12,9 @@ from calibration.targets.boards import AnyBoard, AprilGrid, Chessboard
 from calibration.targets.patterns import (
     ModulePattern,
     Pattern,
+    black_of_modules,
     corners_of,
     inside_share,
-    split_cells,
     within_box,
 )
 from geometry.arrays import Bools, Floats
@@ -144,22 +144,10 @@ class GridPattern:
         x, y = x_mm - column * grid.pitch_mm, y_mm - row * grid.pitch_mm
         near = (np.maximum(abs(x - middle), abs(y - middle)) - middle) < grid.gap_mm / 2.0
         black = squares
-        black[near] += self._tag_black(column[near], row[near], x[near], y[near], box_mm)
+        module_mm = grid.tag_mm / self._size
+        place, inside = (column[near], row[near]), (x[near], y[near])
+        black[near] += black_of_modules(self.modules, self._size, module_mm, place, inside, box_mm)
         return black if grid.inverted else 1.0 - black
-
-    def _tag_black(
-        self, column: Floats, row: Floats, x: Floats, y: Floats, box: tuple[float, float]
-    ) -> Floats:
-        size = self._size
-        module = self.grid.tag_mm / size
-        black = np.zeros(len(x))
-        for i, i_part in split_cells(y / module, box[1] / module):
-            for j, j_part in split_cells(x / module, box[0] / module):
-                on = (i >= 0) & (i < size) & (j >= 0) & (j < size)
-                at_row = row.astype(np.int64) * size + np.clip(i, 0, size - 1)
-                at_column = column.astype(np.int64) * size + np.clip(j, 0, size - 1)
-                black += np.where(on & ~self.modules[at_row, at_column], i_part * j_part, 0.0)
-        return black
 
 
 def _stripes(place: Floats, grid: AprilGrid, count: int, box: float) -> Floats:

@@ -262,25 +262,35 @@ class PlatePattern:
         on &= (row >= 0) & (row < plate.rows)
         if not on.any():
             return share
-        marker = self._marker_black(column[on], row[on], inner_x[on], inner_y[on], box_mm)
+        size = self._modules_per_marker
+        place, inside = (column[on], row[on]), (inner_x[on], inner_y[on])
+        marker = black_of_modules(self.modules, size, side / size, place, inside, box_mm)
         share[on] += marker if plate.inverted else -marker
         return share
 
-    def _marker_black(
-        self, column: Floats, row: Floats, x: Floats, y: Floats, box: tuple[float, float]
-    ) -> Floats:
-        """Share of black that the markers put into white squares."""
-        modules = self.modules
-        size = self._modules_per_marker
-        module_mm = self.plate.marker_mm / size
-        black = np.zeros(len(x))
-        for i, i_part in split_cells(y / module_mm, box[1] / module_mm):
-            for j, j_part in split_cells(x / module_mm, box[0] / module_mm):
-                on = (i >= 0) & (i < size) & (j >= 0) & (j < size)
-                at_row = row.astype(np.int64) * size + np.clip(i, 0, size - 1)
-                at_column = column.astype(np.int64) * size + np.clip(j, 0, size - 1)
-                black += np.where(on & ~modules[at_row, at_column], i_part * j_part, 0.0)
-        return black
+
+def black_of_modules(
+    white: Bools,
+    size: int,
+    module_mm: float,
+    place: tuple[Floats, Floats],
+    inside_mm: tuple[Floats, Floats],
+    box_mm: tuple[float, float],
+) -> Floats:
+    """Share of black (n,) that markers of ``size`` modules each way put into boxes.
+
+    ``white``: the modules of all markers side by side. ``place``: column and row of the marker
+    that each box is nearest to, ``inside_mm``: where the box is in it.
+    """
+    (column, row), (x, y) = place, inside_mm
+    black = np.zeros(len(x))
+    for i, i_part in split_cells(y / module_mm, box_mm[1] / module_mm):
+        for j, j_part in split_cells(x / module_mm, box_mm[0] / module_mm):
+            on = (i >= 0) & (i < size) & (j >= 0) & (j < size)
+            at_row = row.astype(np.int64) * size + np.clip(i, 0, size - 1)
+            at_column = column.astype(np.int64) * size + np.clip(j, 0, size - 1)
+            black += np.where(on & ~white[at_row, at_column], i_part * j_part, 0.0)
+    return black
 
 
 def plate_pattern(plate: CharucoPlate, border_mm: float | None = None) -> PlatePattern:

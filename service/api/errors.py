@@ -15,11 +15,11 @@ from starlette.routing import Match
 from common.errors import InputError, InternalError, RigwrightError
 from common.files.strict import unknown_key
 from service.ipc import error_from_fields
+from service.keys.ring import WRONG_WITHIN_S
 from service.logs import log
 from service.problems import HTTP_ERRORS, MEDIA_TYPE, problem_document, status_of
 
 _RETRY_AFTER_S = "5"
-_GUESSER_WAITS_S = "60"
 
 
 class Refusal(HTTPException):
@@ -51,7 +51,7 @@ def answer(error: RigwrightError, **more: object) -> JSONResponse:
     if response.status_code == 401:
         response.headers["WWW-Authenticate"] = 'Bearer realm="rigwright"'
     if response.status_code == 429:
-        response.headers["Retry-After"] = _GUESSER_WAITS_S
+        response.headers["Retry-After"] = f"{WRONG_WITHIN_S:.0f}"
     if response.status_code in (401, 403, 408, 413, 415, 421, 429):
         # The rest of the body is not read, so nothing else can come on this connection.
         response.headers["Connection"] = "close"

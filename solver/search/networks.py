@@ -59,11 +59,10 @@ class Search:
             reach = np.array([np.linalg.norm(c.camera.body.size_mm) / 2.0 for c in pool.cameras])
             out |= pool.gap_mm < reach[:, None] + reach[None] + self.limits.body_clearance_mm
         if self.limits.sight_line_clearance_mm is not None:
-            seen = in_each_others_view(pool.cameras, self.limits.sight_line_clearance_mm)
-            # What stands already is not for the search to judge.
-            first_fixed = len(pool) - pool.fixed
-            seen[first_fixed:, first_fixed:] = False
-            out |= seen
+            out |= in_each_others_view(pool.cameras, self.limits.sight_line_clearance_mm)
+        # What stands already is not for the search to judge: every network has it.
+        first_fixed = len(pool) - pool.fixed
+        out[first_fixed:, first_fixed:] = False
         np.fill_diagonal(out, val=True)
         return out
 

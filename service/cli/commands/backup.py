@@ -8,12 +8,7 @@ from typing import Annotated
 
 import typer
 
-DataOption = Annotated[
-    Path | None,
-    typer.Option(
-        "--data", metavar="DIR", help="The service's data folder, as for serve.", show_default=False
-    ),
-]
+from service.cli.options import DataOption
 
 
 def backup(

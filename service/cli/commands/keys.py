@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from service.cli.options import JsonOption
+from service.cli.options import DataOption, JsonOption
 
 if TYPE_CHECKING:
     from service.keys.keyfile import Key
@@ -19,12 +19,6 @@ keys = typer.Typer(
 
 NameArgument = Annotated[
     str, typer.Argument(metavar="NAME", help="Whose key it is.", show_default=False)
-]
-DataOption = Annotated[
-    Path | None,
-    typer.Option(
-        "--data", metavar="DIR", help="The service's data folder, as for serve.", show_default=False
-    ),
 ]
 
 

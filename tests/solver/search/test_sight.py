@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 import rigs
 
 from geometry.camera import Body, RigCamera
 from geometry.frames import Pose, look_at_rotation
 from solver.constraints.builders.bodies import body_constraints
-from solver.limits import Coverage
+from solver.limits import BaseHeight, Coverage, Limits
 from solver.problem import Problem
 from solver.search.candidates import Candidates
 from solver.search.networks import Search
@@ -32,6 +33,14 @@ def around(seed: int, count: int = 24) -> tuple[RigCamera, ...]:
         pose = Pose(place, look_at_rotation(place, 40.0 * rng.normal(size=3), 30.0 * k))
         out.append(RigCamera(f"at{k}", kinds[k % 2], pose, float(np.linalg.norm(place))))
     return tuple(out)
+
+
+def pool_of(cameras: tuple[RigCamera, ...], fixed: int) -> Candidates:
+    """Candidates that see nothing, of which the last ``fixed`` stand already."""
+    place = np.stack([c.pose.position_rig_mm for c in cameras])
+    nothing, count = np.zeros((len(cameras), 6, 2)), len(cameras)
+    seen = np.zeros((count, 2), dtype=np.bool_)
+    return Candidates(cameras, nothing, seen, 0.1, place, np.linalg.norm(place, axis=1), fixed)
 
 
 def test_pairs_are_those_that_break_the_limit() -> None:
@@ -57,12 +66,24 @@ def test_a_network_holds_no_such_pair_unless_both_stand_already() -> None:
     limits = replace(limits, base_height=replace(limits.base_height, min=None))
 
     def too_close(fixed: int) -> bool:
-        place = np.stack([c.pose.position_rig_mm for c in order])
-        seen = np.zeros((6, 2), dtype=np.bool_)
-        distance = np.linalg.norm(place, axis=1)
-        pool = Candidates(tuple(order), np.zeros((6, 6, 2)), seen, 0.1, place, distance, fixed)
-        return bool(Search(pool, limits).too_close[0, 5])
+        return bool(Search(pool_of(tuple(order), fixed), limits).too_close[0, 5])
 
     assert too_close(0)
     assert too_close(1)
     assert not too_close(6)
+
+
+@pytest.mark.parametrize(
+    "limits",
+    [
+        replace(LIMITS, sight_line_clearance_mm=None, body_clearance_mm=1e4),
+        replace(LIMITS, sight_line_clearance_mm=None, base_height=BaseHeight(min=5.0)),
+    ],
+    ids=["bodies", "base/height"],
+)
+def test_cameras_that_stand_too_near_to_each_other_already_are_in_networks(limits: Limits) -> None:
+    def too_close(fixed: int) -> bool:
+        return bool(Search(pool_of(around(3, 6), fixed), limits).too_close[4, 5])
+
+    assert too_close(1)
+    assert not too_close(2)
