@@ -23,7 +23,7 @@ from solver.quality import evaluate
 from solver.refinement import optimality_error, refine
 from solver.result import Design, Quality, Relaxation, SolverReport, StartReport, Status
 from solver.search.exchange import search_networks
-from solver.starts import kmeans_start, strips
+from solver.starts import kmeans_start, strips, turned
 from solver.strategy import Strategy
 
 ENGINE = "sequential quadratic programming with exact second derivatives (PIQP)"
@@ -252,7 +252,7 @@ def _jobs(request: Request, first: int, cancel: CancelToken) -> list[StartJob]:
         add(
             "given",
             tuple(
-                camera_at(camera, n, p, _target(subject))
+                camera_at(camera, n, turned(p, limits), _target(subject))
                 for n, p in zip(names, request.start, strict=True)
             ),
         )
@@ -287,7 +287,7 @@ def _jittered(request: Request, index: int) -> tuple[RigCamera, ...]:
             camera_at(
                 request.camera,
                 name,
-                Pose.from_omega_phi_kappa(position, angles),
+                turned(Pose.from_omega_phi_kappa(position, angles), request.limits),
                 _target(request.subject),
             )
         )

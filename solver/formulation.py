@@ -11,6 +11,7 @@ from solver.constraints.builders.bodies import body_constraints
 from solver.constraints.builders.coverage import assigned_view_constraints
 from solver.constraints.builders.positions import position_constraints
 from solver.constraints.builders.rays import ray_constraints
+from solver.constraints.builders.rolls import roll_constraints
 from solver.constraints.candidates import CandidateConstraints
 from solver.coverage.views import Views, views
 from solver.information import CovarianceCost
@@ -88,6 +89,7 @@ def candidate_constraints(
     return (
         ray_constraints(problem, seen.framed)
         + assigned_view_constraints(problem, seen.assigned, seen.margin_deg)
+        + roll_constraints(problem, state)
         + position_constraints(problem, state)
         + body_constraints(problem, state)
     )

@@ -6,6 +6,7 @@ Names follow the literature; equation numbers are those of the source paper.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from enum import StrEnum
 
 import numpy as np
 
@@ -191,6 +192,43 @@ class Coverage:
             )
 
 
+ROLL_TOLERANCE_DEG = 0.5
+"""A picture within this of level is level: what a person sets by the bubble of a head, and what a
+matcher never notices. A design holds its rolls exactly."""
+
+
+class Roll(StrEnum):
+    """How pictures may be turned about their cameras' axes, level being upright to the head.
+
+    Portrait is a quarter turn to either side.
+    """
+
+    FREE = "free"
+    LEVEL = "level"
+    PORTRAIT = "portrait"
+    LEVEL_OR_PORTRAIT = "level-or-portrait"
+
+    @property
+    def allowed_deg(self) -> tuple[float, ...]:
+        """The rolls that are allowed; none where every one is."""
+        level = (0.0,) if self in (Roll.LEVEL, Roll.LEVEL_OR_PORTRAIT) else ()
+        portrait = (90.0, -90.0) if self in (Roll.PORTRAIT, Roll.LEVEL_OR_PORTRAIT) else ()
+        return level + portrait
+
+    @property
+    def at_start_deg(self) -> tuple[float, ...]:
+        """The rolls of which a start takes the better: a half turn shows the same upside down."""
+        return tuple(a for a in self.allowed_deg if a >= 0.0) or (0.0, 90.0)
+
+    def nearest_deg(self, roll_deg: float) -> float:
+        """The allowed roll that is nearest to one; itself where every one is allowed."""
+
+        def away(allowed: float) -> float:
+            return abs((roll_deg - allowed + 180.0) % 360.0 - 180.0)
+
+        return min(self.allowed_deg, key=away, default=roll_deg)
+
+
 @dataclass(frozen=True)
 class StandOff:
     """Distance of each projection centre from the centroid of the object."""
@@ -310,6 +348,7 @@ class Limits:
     coverage: Coverage = field(default_factory=Coverage)
     depth_of_field: bool = True
     gsd_max_mm: float | None = None
+    roll: Roll = Roll.FREE
     stand_off: StandOff = field(default_factory=StandOff)
     body_clearance_mm: float | None = 0.0
     sight_line_clearance_mm: float | None = 0.0

@@ -166,9 +166,9 @@ def _cameras(problem: Problem, rest: Observations) -> CameraTable:
         depth[i] = z.min(), z.max()
     centres = np.stack([c.pose.position_rig_mm for c in problem.cameras])
     distance = np.linalg.norm(centres - problem.origin_mm, axis=1)
-    return CameraTable(
-        rest.framed.sum(axis=1), gsd, incidence, depth, focus, distance, nearest_body_mm(problem)
-    )
+    roll = np.array([c.pose.pan_tilt_roll_deg[2] for c in problem.cameras])
+    seen, gap = rest.framed.sum(axis=1), nearest_body_mm(problem)
+    return CameraTable(seen, gsd, incidence, depth, focus, distance, gap, roll)
 
 
 def nearest_body_mm(problem: Problem) -> Floats:

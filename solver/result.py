@@ -87,7 +87,8 @@ class CameraTable:
     ``points_seen`` count; ``gsd_mm`` (n, 3) smallest, mean, largest ground sample distance;
     ``incidence_deg`` (n, 2) mean and largest angle between ray and normal; ``depth_mm`` (n, 2)
     nearest and farthest seen point; ``focus_mm`` (n, 2) limits of the depth of field;
-    ``distance_mm`` (n,) to the centroid; ``nearest_body_mm`` (n,) clearance to the next body.
+    ``distance_mm`` (n,) to the centroid; ``nearest_body_mm`` (n,) clearance to the next body;
+    ``roll_deg`` (n,) about the axis from level, clockwise as seen from behind.
     """
 
     points_seen: Ints
@@ -97,6 +98,7 @@ class CameraTable:
     focus_mm: Floats
     distance_mm: Floats
     nearest_body_mm: Floats
+    roll_deg: Floats
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,7 +14,7 @@ from geometry.frames import Pose, look_at_rotation
 from geometry.optics import blur_ratio
 from geometry.subject import Subject
 from geometry.surface import SurfacePoints
-from solver.limits import Limits
+from solver.limits import ROLL_TOLERANCE_DEG, Limits
 from solver.problem import camera_at
 
 _FARTHEST_RADII = 100.0
@@ -86,10 +86,34 @@ def _sharp(camera: Camera, near: float, far: float) -> bool:
     return bool(near > 0.0 and focus - near <= k * near and far - focus <= k * far)
 
 
-def better_roll(camera: Camera, limits: Limits, points_mm: Floats, forward: Floats) -> float:
-    """0 for landscape or 90 for portrait, whichever lets the camera stand closer."""
-    distances = [fitting_distance(camera, limits, points_mm, forward, roll) for roll in (0.0, 90.0)]
-    return 90.0 if distances[1] < 0.99 * distances[0] else 0.0
+def better_roll(
+    camera: Camera,
+    limits: Limits,
+    points_mm: Floats,
+    forward: Floats,
+    target_mm: Floats | None = None,
+) -> tuple[float, float]:
+    """0 for landscape or 90 for portrait, whichever lets the camera stand closer, and how close.
+
+    Of those that the limit on roll allows; see :func:`fitting_distance`.
+    """
+    found = [
+        (roll, fitting_distance(camera, limits, points_mm, forward, roll, target_mm))
+        for roll in limits.roll.at_start_deg
+    ]
+    return found[-1] if found[-1][1] < 0.99 * found[0][1] else found[0]
+
+
+def turned(pose: Pose, limits: Limits) -> Pose:
+    """A pose turned about its axis to the nearest roll that the limits allow.
+
+    One within the tolerance stays as it is: what was given and meets the limits is not touched.
+    """
+    roll = float(pose.pan_tilt_roll_deg[2])
+    allowed = limits.roll.nearest_deg(roll)
+    if abs((roll - allowed + 180.0) % 360.0 - 180.0) <= ROLL_TOLERANCE_DEG:
+        return pose
+    return Pose(pose.position_rig_mm, look_at_rotation(np.zeros(3), pose.axis_rig, allowed))
 
 
 def _clusters(points: SurfacePoints, count: int, seed: int) -> list[tuple[Floats, Floats]]:
@@ -131,8 +155,7 @@ def kmeans_start(
     for name, (centre, normal) in zip(names, _clusters(points, len(names), seed), strict=True):
         rotation = Rotation.from_rotvec(np.radians(jitter * _JITTER_DEG) * rng.normal(size=3))
         outward = rotation.apply(normal)
-        roll = better_roll(camera, limits, points.points_mm, -outward)
-        distance = fitting_distance(camera, limits, points.points_mm, -outward, roll)
+        roll, distance = better_roll(camera, limits, points.points_mm, -outward)
         distance *= 1.0 + abs(jitter * _JITTER_DISTANCE * rng.normal())
         position = centre + distance * outward
         pose = Pose(position, look_at_rotation(position, centre, roll))
@@ -155,7 +178,7 @@ def strip(
         [np.sin(turns + heading), -np.cos(turns + heading), np.zeros(len(names))], axis=1
     )
     points = subject.check_points.points_mm
-    roll = better_roll(camera, limits, points, -outward[len(names) // 2])
+    roll, _ = better_roll(camera, limits, points, -outward[len(names) // 2])
     distance = max(fitting_distance(camera, limits, points, -u, roll, middle) for u in outward)
     poses = [Pose(middle + distance * u, look_at_rotation(np.zeros(3), -u, roll)) for u in outward]
     return tuple(camera_at(camera, n, p, points) for n, p in zip(names, poses, strict=True))

@@ -82,6 +82,9 @@ class CameraFigures(StrictModel):
     sharp_to_mm: Number = Field(description="Far limit of the depth of field; null: infinity.")
     distance_mm: Number = Field(description="Distance to the object's centroid.")
     nearest_body_mm: Number = Field(description="Gap to the next body; null: none.")
+    roll_deg: Number = Field(
+        default=None, description="Turn about the axis from level, clockwise seen from behind."
+    )
 
 
 class QualityFigures(StrictModel):

@@ -58,6 +58,7 @@ def _camera_figures(quality: Quality, index: int, name: str) -> dict[str, Any]:
         "sharp_to_mm": number(focus[1]),
         "distance_mm": number(table.distance_mm[index]),
         "nearest_body_mm": number(table.nearest_body_mm[index]),
+        "roll_deg": number(table.roll_deg[index]),
     }
 
 

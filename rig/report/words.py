@@ -14,6 +14,7 @@ FAMILIES: dict[str, tuple[str, str]] = {
     ),
     "frame": ("In frame", "Every seen point lies inside the image (Eq 11)."),
     "centring": ("Centred image", "The seen points are centred in the image (Eq 12)."),
+    "roll": ("Roll", "Pictures stand level, or upright on their side."),
     "spacing": ("Spacing", "Mean distance of neighbouring cameras (Eq 13)."),
     "symmetry": ("Symmetry", "Camera positions are symmetric about the subject (Eqs 14, 15)."),
     "coverage": ("Coverage", "Share of the region that enough cameras see."),

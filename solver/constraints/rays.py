@@ -187,6 +187,31 @@ class MeanImageCoordinate(Block):
 
 
 @dataclass(frozen=True, eq=False)
+class LevelAxis(Block):
+    """``R[axis, 2]``: how steeply an axis of the image rises, as a sine. ``camera``, ``axis`` (m,).
+
+    Zero for the x axis (0) of a level camera and for the y axis (1) of one on its side.
+    """
+
+    camera: Ints
+    axis: Ints
+
+    @property
+    def columns(self) -> Ints:
+        return camera_columns(self.camera, 3)
+
+    def value(self, state: NetworkState) -> Floats:
+        return np.asarray(state.rotation[self.camera, self.axis, 2])
+
+    def jacobian(self, state: NetworkState) -> Floats:
+        return np.asarray(state.rotation_1[self.camera, :, self.axis, 2])
+
+    def add_hessian(self, state: NetworkState, multipliers: Floats, out: Floats) -> None:
+        bend = state.rotation_2[self.camera, :, :, self.axis, 2]
+        scatter(out, self.columns, multipliers[:, None, None] * bend)
+
+
+@dataclass(frozen=True, eq=False)
 class MeanAxisIncidence(Block):
     """Eq 10 as the paper's Table 2 has it: the mean angle between the optical axis and the normals.
 

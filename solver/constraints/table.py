@@ -19,6 +19,7 @@ from solver.constraints.base import WeightedSum
 from solver.constraints.builders.bodies import body_constraints
 from solver.constraints.builders.positions import position_constraints
 from solver.constraints.candidates import CandidateConstraints
+from solver.limits import ROLL_TOLERANCE_DEG
 from solver.problem import Problem
 from solver.result import ConstraintRow, CoverageShare, Sense
 from solver.variables import PER_CAMERA
@@ -28,6 +29,8 @@ SATISFIED = 1e-6
 
 BINDING = 1e-3
 """Relative slack below which a limit is said to bind."""
+
+_STEEPEST_DEG = 89.0
 
 
 def row(
@@ -65,6 +68,7 @@ def constraint_table(
     seen = np.logical_or.reduce(visible)
     for i, camera in enumerate(problem.cameras):
         rows += _of_camera(problem, camera, seen[i])
+    rows += _rolls(problem)
     rows += _means(problem)
     for candidates in position_constraints(problem, state) + body_constraints(problem, state):
         rows += _of_block(problem, candidates)
@@ -126,6 +130,19 @@ def _largest_blur(camera: RigCamera, depth: Floats) -> float:
     return float(
         blur_disk_mm(depth, camera.focus_distance_mm, kind.focal_length_mm, kind.f_number).max()
     )
+
+
+def _rolls(problem: Problem) -> Iterator[ConstraintRow]:
+    """The roll of each camera that may be turned; one that looks straight up or down has none."""
+    limit = problem.limits.roll
+    for camera in problem.cameras if limit.allowed_deg else ():
+        _, tilt, roll = (float(v) for v in camera.pose.pan_tilt_roll_deg)
+        if camera.fixed or abs(tilt) > _STEEPEST_DEG:
+            continue
+        allowed = limit.nearest_deg(roll)
+        value = allowed + (roll - allowed + 180.0) % 360.0 - 180.0
+        width = ROLL_TOLERANCE_DEG
+        yield row(f"roll/{camera.name}", value, allowed, Sense.EQUAL, "deg", width, width)
 
 
 def _means(problem: Problem) -> Iterator[ConstraintRow]:

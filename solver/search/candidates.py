@@ -20,7 +20,7 @@ from solver.information import ray_information
 from solver.limits import Limits
 from solver.motion import visibility_positions
 from solver.problem import Problem, camera_at
-from solver.starts import fitting_distance
+from solver.starts import better_roll
 
 STEP_DEG = 6.0
 """Angle between neighbouring candidate directions: finer ones are left to the continuous solve."""
@@ -141,13 +141,9 @@ def _thinned(points: SurfacePoints, most: int) -> SurfacePoints:
 
 
 def _pose(camera: Camera, limits: Limits, points_mm: Floats, away: Floats, middle: Floats) -> Pose:
-    level, upright = (
-        fitting_distance(camera, limits, points_mm, -away, roll, middle) for roll in (0.0, 90.0)
-    )
-    roll = 90.0 if upright < 0.99 * level else 0.0
-    distance = _ROOM * (upright if roll else level)
+    roll, nearest = better_roll(camera, limits, points_mm, -away, middle)
     low, high = limits.stand_off.min_mm or 0.0, limits.stand_off.max_mm or np.inf
-    distance = float(np.clip(distance, low, high))
+    distance = float(np.clip(_ROOM * nearest, low, high))
     return Pose(middle + distance * away, look_at_rotation(np.zeros(3), -away, roll))
 
 

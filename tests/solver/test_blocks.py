@@ -15,7 +15,13 @@ from solver.constraints.positions import (
     PositionCoordinate,
     PositionDistance,
 )
-from solver.constraints.rays import FocusRays, MeanAxisIncidence, MeanImageCoordinate, RayPlanes
+from solver.constraints.rays import (
+    FocusRays,
+    LevelAxis,
+    MeanAxisIncidence,
+    MeanImageCoordinate,
+    RayPlanes,
+)
 from solver.information import CovarianceCost
 from solver.problem import Problem
 
@@ -70,6 +76,7 @@ def blocks(problem: Problem) -> dict[str, Block]:
         "axis_incidence": MeanAxisIncidence(
             **per_camera, camera=every, normals=(problem.subject.design_points.normals,)
         ),
+        "level": LevelAxis(**head, camera=camera, axis=rng.integers(0, 2, m)),
         "cones": PositionCones(
             **head, camera=camera, point=vectors(0.1), normal=vectors(1.0), opening=rng.random(m)
         ),
@@ -115,6 +122,7 @@ def dense_jacobian(block: Block, problem: Problem, at: np.ndarray) -> np.ndarray
         "focus",
         "mean_image",
         "axis_incidence",
+        "level",
         "cones",
         "distance",
         "coordinate",

@@ -221,8 +221,8 @@ def test_portrait_is_chosen_where_it_lets_the_camera_stand_closer() -> None:
     limits = rigs.face_limits(depth_of_field=False, stand_off=StandOff())
     forward = np.array([0.0, 1.0, 0.0])
     tall, wide = points * [0.5, 1.0, 1.0], points * [1.0, 1.0, 0.5]
-    assert better_roll(rigs.compact_camera(), limits, tall, forward) == 90.0
-    assert better_roll(rigs.compact_camera(), limits, wide, forward) == 0.0
+    assert better_roll(rigs.compact_camera(), limits, tall, forward)[0] == 90.0
+    assert better_roll(rigs.compact_camera(), limits, wide, forward)[0] == 0.0
 
 
 def test_the_axis_rotation_looks_along_its_direction_and_is_level() -> None:

@@ -24,6 +24,7 @@ from solver.limits import (
     Limits,
     MotionBox,
     PoseBounds,
+    Roll,
     Spacing,
     StandOff,
     Symmetry,
@@ -252,6 +253,13 @@ class LimitsSection(StrictModel):
     coverage: CoverageSection | None = Field(default=None, description="Views per point.")
     depth_of_field: DepthOfFieldSection | None = Field(default=None, description="Sharpness.")
     gsd: GsdSection | None = Field(default=None, description="Pixel size on the object.")
+    roll: Roll = Field(
+        default=Limits().roll,
+        strict=False,
+        description='How pictures may be turned: `"level"`, upright to the head; `"portrait"`, a '
+        'quarter turn to either side; `"level-or-portrait"`, for each camera the one that lets it '
+        'stand closer; `"free"`.',
+    )
     stand_off: StandOffSection | None = Field(default=None, description="Distance to the object.")
     bodies: BodiesSection | None = Field(default=None, description="Gap between bodies.")
     sight_lines: SightLinesSection | None = Field(default=None, description="Free views.")
@@ -276,6 +284,7 @@ class LimitsSection(StrictModel):
             if self.depth_of_field is None
             else self.depth_of_field.enabled,
             gsd_max_mm=gsd.max_mm if gsd is not None and gsd.enabled else None,
+            roll=self.roll,
             stand_off=_limit(self.stand_off, StandOff, StandOff(), StandOff()),
             body_clearance_mm=_clearance(bodies, default.body_clearance_mm),
             sight_line_clearance_mm=_clearance(sight, default.sight_line_clearance_mm),
@@ -303,6 +312,7 @@ class LimitsSection(StrictModel):
             coverage=CoverageSection.from_limit(limits.coverage),
             depth_of_field=DepthOfFieldSection(enabled=limits.depth_of_field),
             gsd=None if gsd is None else GsdSection(max_mm=gsd),
+            roll=limits.roll,
             stand_off=_section(StandOffSection, limits.stand_off),
             bodies=BodiesSection(enabled=body is not None, clearance_mm=body or 0.0),
             sight_lines=SightLinesSection(enabled=sight is not None, clearance_mm=sight or 0.0),

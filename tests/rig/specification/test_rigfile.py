@@ -149,7 +149,7 @@ SWITCHES = {
 def test_every_limit_has_a_switch() -> None:
     from rig.specification.sections.limits import LimitsSection
 
-    assert set(SWITCHES) | {"image_sigma_px"} == set(LimitsSection.model_fields)
+    assert set(SWITCHES) | {"image_sigma_px", "roll"} == set(LimitsSection.model_fields)
 
 
 @pytest.mark.parametrize("family", SWITCHES)
