@@ -12,6 +12,7 @@ import numpy as np
 
 from common.errors import InputError
 from geometry.arrays import Floats, frozen
+from solver.matching import Matching
 
 
 def _bad(problem: str, remedy: str) -> InputError:
@@ -354,6 +355,7 @@ class Limits:
     sight_line_clearance_mm: float | None = 0.0
     zones: Zones = field(default_factory=Zones)
     motion: MotionBox | None = None
+    matching: Matching = field(default_factory=Matching)
 
     def __post_init__(self) -> None:
         _non_negative(

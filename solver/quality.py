@@ -13,6 +13,7 @@ from geometry.frames import Pose
 from geometry.optics import blur_disk_mm, depth_of_field_mm, ground_sample_distance_mm
 from geometry.subject import Subject
 from solver.constraints.table import constraint_table
+from solver.coverage.matchable import Matchable, MatchableViews
 from solver.coverage.views import in_frame
 from solver.coverage.visibility import cast_rays
 from solver.information import normal_matrices
@@ -88,6 +89,8 @@ def evaluate(
     points = _points(problem, rest)
     seen = int(rest.visible.sum())
     coverage = _coverage(problem, found)
+    positions = zip(problem.visibility_positions, found, strict=True)
+    matchable = tuple(matchable_views(problem, position, f) for position, f in positions)
     return Quality(
         cost_mm2=float(points.norm_mm2.mean()),
         sigma_median_mm=float(np.median(points.sigma_mm)),
@@ -101,7 +104,20 @@ def evaluate(
         cameras=_cameras(problem, rest),
         points=points,
         constraints=constraint_table(problem, [f.visible for f in found], coverage),
+        matchable=Matchable(subject, limits, matchable),
     )
+
+
+def matchable_views(
+    problem: Problem, position: HeadPosition, found: Observations
+) -> MatchableViews:
+    """What a matcher could use of what the cameras see with the head in one position."""
+    matching = problem.limits.matching
+    usable = found.sharp & (found.cosine >= np.cos(np.radians(matching.max_incidence_deg)))
+    focal = np.array([c.camera.focal_length_px for c in problem.cameras])
+    centres = np.stack([c.pose.position_rig_mm for c in problem.cameras])
+    points = position.points(problem.subject.check_points.points_mm)
+    return MatchableViews(matching, usable, centres, points, found.depth_mm / focal[:, None])
 
 
 def _coverage(problem: Problem, found: list[Observations]) -> tuple[CoverageShare, ...]:

@@ -10,6 +10,7 @@ import numpy as np
 from geometry.arrays import Floats, Ints
 from geometry.camera import RigCamera
 from geometry.surface import SurfacePoints
+from solver.coverage.matchable import Matchable
 from solver.limits import Limits
 
 
@@ -121,6 +122,7 @@ class Quality:
     cameras: CameraTable
     points: PointTable
     constraints: tuple[ConstraintRow, ...]
+    matchable: Matchable
 
     @property
     def feasible(self) -> bool:

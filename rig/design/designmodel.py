@@ -87,6 +87,22 @@ class CameraFigures(StrictModel):
     )
 
 
+class MatchableFigures(StrictModel):
+    """What dense matching can make of what the cameras see."""
+
+    share: Number = Field(description="Share in a pair or more, of the points that can be.")
+    reachable_share: Number = Field(
+        description="Share of the points that two cameras could match wherever they stood."
+    )
+    shared: list[list[Number]] = Field(
+        description="Share of the points that each pair of cameras can match."
+    )
+    connected: bool = Field(description="Whether all cameras are one group.")
+    groups: list[list[str]] = Field(
+        description="Names of the cameras that hang together by the surface they share."
+    )
+
+
 class QualityFigures(StrictModel):
     """Every figure of a network of cameras."""
 
@@ -100,6 +116,9 @@ class QualityFigures(StrictModel):
     base_height: list[list[Number]] = Field(description="B/H of camera pairs.")
     convergence_deg: list[list[Number]] = Field(description="Angle between axes of camera pairs.")
     cameras: list[CameraFigures] = Field(description="Figures per camera.")
+    matchable: MatchableFigures | None = Field(
+        default=None, description="Pairs of cameras that can match."
+    )
 
 
 class ConstraintFigures(StrictModel):
@@ -161,6 +180,9 @@ class PointFigures(StrictModel):
     sigma_mm: list[Number] = Field(description="Longest semi-axis of the error ellipsoid, 1 sigma.")
     views: list[int] = Field(description="How many cameras see it.")
     in_focus: list[int] = Field(description="How many of them see it sharp.")
+    matchable_pairs: list[int] | None = Field(
+        default=None, description="How many pairs of cameras can match it."
+    )
 
 
 class StartPose(StrictModel):

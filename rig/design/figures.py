@@ -9,6 +9,7 @@ import numpy as np
 
 from common.files.plain import number
 from geometry.arrays import Floats
+from solver.coverage.matchable import Matchable
 from solver.result import ConstraintRow, Quality, SolverReport
 
 UPPER_TRIANGLE = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
@@ -37,6 +38,17 @@ def quality_figures(quality: Quality, names: list[str]) -> dict[str, Any]:
         "base_height": _table(quality.base_height),
         "convergence_deg": _table(quality.convergence_deg),
         "cameras": [_camera_figures(quality, i, name) for i, name in enumerate(names)],
+        "matchable": _matchable_figures(quality.matchable, names),
+    }
+
+
+def _matchable_figures(matchable: Matchable, names: list[str]) -> dict[str, Any]:
+    return {
+        "share": number(matchable.share(1)),
+        "reachable_share": number(matchable.reachable_share),
+        "shared": _table(matchable.shared),
+        "connected": len(matchable.groups) == 1,
+        "groups": [[names[k] for k in group] for group in matchable.groups],
     }
 
 
@@ -91,6 +103,7 @@ def point_figures(quality: Quality) -> dict[str, Any]:
         "sigma_mm": [_short(v) for v in table.sigma_mm],
         "views": [int(v) for v in table.views],
         "in_focus": [int(v) for v in table.in_focus],
+        "matchable_pairs": [int(v) for v in quality.matchable.pairs_of_point],
     }
 
 

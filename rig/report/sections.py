@@ -9,6 +9,7 @@ from rig.design.layout import Layout
 from rig.report import tables
 from rig.report.drawings import array_drawing, footprint
 from rig.report.ellipsoids import Ellipsoids
+from rig.report.matchable import matchable
 from solver.result import Design, Status
 
 
@@ -139,7 +140,14 @@ def cameras(design: Design) -> str:
         ),
         class_="grid2",
     )
-    return section("cameras", "What each camera sees", words, tables.camera_table(design), pairs)
+    return section(
+        "cameras",
+        "What each camera sees",
+        words,
+        tables.camera_table(design),
+        pairs,
+        matchable(design),
+    )
 
 
 def mounts(design: Design, layout: Layout, subject: Subject) -> str:

@@ -8,7 +8,7 @@ from common.page.html import element, esc, figure_text, percent
 from rig.design.layout import Layout
 from rig.report import tables
 from rig.report.words import family_words
-from solver.result import Design
+from solver.result import Design, Quality
 
 CONTENTS = (
     ("rig", "Rig"),
@@ -78,10 +78,16 @@ def tiles(design: Design, layout: Layout) -> str:
         _tile("95 % of points below", _mm(quality.sigma_p95_mm), f"largest {largest} mm"),
         _tile("Seen by two or more", two, f"by three or more: {three}"),
         _tile("Sharp", percent(quality.in_focus_share), f"in frame: {frame}"),
+        _tile("Can be matched", percent(quality.matchable.share(1)), _groups(quality)),
         _tile("Pixel on the subject", _mm(mean_gsd), "mean over the cameras"),
         _tile("Room the array takes", *_room(layout)),
     )
     return f'<div class="tiles">{"".join(parts)}</div>'
+
+
+def _groups(quality: Quality) -> str:
+    count = len(quality.matchable.groups)
+    return "all cameras are one group" if count == 1 else f"the cameras are {count} groups"
 
 
 def _mm(value: float) -> str:

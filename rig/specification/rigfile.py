@@ -6,6 +6,7 @@ TOML in files, the same structure as JSON over HTTP. ``docs/reference/rig-file.m
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal, Self
 
@@ -16,6 +17,7 @@ from common.files.toml import parsed, read_text
 from rig.catalogue import Catalogue
 from rig.specification.sections.camera import CameraSection
 from rig.specification.sections.limits import LimitsSection
+from rig.specification.sections.matching import MatchingSection
 from rig.specification.sections.parts import CATALOGUE
 from rig.specification.sections.poses import FixedSection, StartSection
 from rig.specification.sections.subject import ScanSection, SubjectSection
@@ -56,6 +58,9 @@ class RigFile(StrictModel):
     limits: LimitsSection = Field(
         default_factory=LimitsSection, description="What the rig must respect."
     )
+    matching: MatchingSection = Field(
+        default_factory=MatchingSection, description="What a dense matcher can use."
+    )
     fixed: list[FixedSection] = Field(default_factory=list, description="Cameras that stay.")
     start: list[StartSection] = Field(default_factory=list, description="Poses to start from.")
     scan: ScanSection = Field(default_factory=ScanSection, description="How to read the scan.")
@@ -73,7 +78,7 @@ class RigFile(StrictModel):
             seed=self.seed,
             starts=self.starts,
             strategy=self.strategy,
-            limits=self.limits.to_limits(),
+            limits=replace(self.limits.to_limits(), matching=self.matching.to_matching()),
             fixed=tuple(section.to_rig_camera(camera) for section in self.fixed),
             start=tuple(section.to_pose() for section in self.start),
             scan_options=self.scan.to_options(),
@@ -92,6 +97,7 @@ class RigFile(StrictModel):
             strategy=spec.strategy,
             camera=CameraSection.from_camera(spec.camera),
             limits=LimitsSection.from_limits(spec.limits),
+            matching=MatchingSection.from_matching(spec.limits.matching),
             fixed=[FixedSection.from_rig_camera(camera) for camera in spec.fixed],
             start=[StartSection.from_pose(pose) for pose in spec.start],
             scan=ScanSection.from_options(spec.scan_options),

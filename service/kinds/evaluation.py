@@ -58,6 +58,14 @@ class EvaluationResult(Result):
     coverage: list[Coverage]
     in_focus_share: Figure
     in_frame_share: Figure
+    matchable_share: Annotated[
+        Figure,
+        Field(description="Share in a matchable pair of cameras, of the points that can be."),
+    ] = None
+    groups: Annotated[
+        list[list[str]] | None,
+        Field(description="Cameras that hang together by the surface that they can match."),
+    ] = None
     violated: Annotated[list[str], Field(description="Names of the limits that are broken.")]
     notes: Annotated[
         list[Note],

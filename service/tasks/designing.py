@@ -68,7 +68,7 @@ def evaluation(
     quality = evaluate(prepared.subject, cameras, spec.limits)
     document = json.dumps(evaluation_document(cameras, quality))
     (task.folder / "evaluation.json").write_text(document, encoding="utf-8")
-    return _scored(quality, len(cameras), prepared)
+    return _scored(quality, [c.name for c in cameras], prepared)
 
 
 def _designed(
@@ -112,11 +112,11 @@ def write_scan(scan: Scan, path: Path) -> None:
     ).export(path)
 
 
-def _scored(quality: Quality, cameras: int, prepared: PreparedSubject) -> EvaluationResult:
+def _scored(quality: Quality, names: list[str], prepared: PreparedSubject) -> EvaluationResult:
     """The figures of a network in short."""
     return EvaluationResult(
         feasible=bool(quality.feasible),
-        cameras=cameras,
+        cameras=len(names),
         cost_mm2=float(quality.cost_mm2),
         sigma_median_mm=float(quality.sigma_median_mm),
         sigma_p95_mm=float(quality.sigma_p95_mm),
@@ -124,6 +124,8 @@ def _scored(quality: Quality, cameras: int, prepared: PreparedSubject) -> Evalua
         coverage=[Coverage(views=row.views, share=float(row.share)) for row in quality.coverage],
         in_focus_share=float(quality.in_focus_share),
         in_frame_share=float(quality.in_frame_share),
+        matchable_share=quality.matchable.share(1),
+        groups=[[names[k] for k in group] for group in quality.matchable.groups],
         violated=[row.name for row in quality.violated],
         notes=notes_of(prepared.notes),
     )
@@ -131,7 +133,7 @@ def _scored(quality: Quality, cameras: int, prepared: PreparedSubject) -> Evalua
 
 def _result(made: Design, layout: Layout, prepared: PreparedSubject, spec: RigSpec) -> DesignResult:
     """A design in short."""
-    scored = _scored(made.quality, len(made.cameras), prepared)
+    scored = _scored(made.quality, [c.name for c in made.cameras], prepared)
     conflicts = [
         Conflict(family=c.family, unit=c.unit, give=c.amount, give_alone=c.amount_alone)
         for c in made.solver.conflicts

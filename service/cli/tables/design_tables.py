@@ -38,7 +38,19 @@ def print_figures(result: EvaluationResult, start_cost_mm2: float | None = None)
         table.add_row(f"points seen by {row.views} or more", _share(row.share))
     table.add_row("views in focus", _share(result.in_focus_share))
     table.add_row("views in frame", _share(result.in_frame_share))
+    table.add_row(
+        "points in a matchable pair, of those that can be", _share(result.matchable_share)
+    )
+    table.add_row("groups of cameras that match", _groups(result.groups))
     Console().print(table)
+
+
+def _groups(groups: list[list[str]] | None) -> str:
+    """How many cameras each group has, where there are several."""
+    if groups is None:
+        return "-"
+    sizes = " + ".join(str(len(group)) for group in groups)
+    return "1" if len(groups) == 1 else f"{len(groups)}: {sizes} cameras"
 
 
 def print_notes(result: EvaluationResult) -> None:

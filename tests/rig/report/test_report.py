@@ -80,6 +80,21 @@ def without_plotly(page: str) -> str:
     return page.replace(get_plotlyjs(), "")
 
 
+def test_what_can_be_matched_is_told_with_the_groups_of_cameras(
+    design: Design, subject: Subject
+) -> None:
+    found = design.quality.matchable
+    page = report(design, subject)
+    assert f"{percent(found.share(1))} are in such a pair" in page
+    strict = replace(design.limits.matching, least_shared=1.0)
+    views = tuple(replace(v, matching=strict) for v in found.positions)
+    quality = replace(design.quality, matchable=replace(found, positions=views))
+    apart = report(replace(design, quality=quality), subject)
+    names = "; ".join(camera.name for camera in design.cameras)
+    assert f"the cameras are {len(design.cameras)} groups: {names}." in apart
+    assert f"the cameras are {len(design.cameras)} groups" not in page
+
+
 def test_the_page_is_well_formed_and_loads_nothing(page: str) -> None:
     elements = parsed(page)
     for tag, attributes in elements.found:

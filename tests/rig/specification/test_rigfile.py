@@ -18,7 +18,8 @@ from geometry.reading import read_scan
 from rig.specification.examples import example_names, example_rig, example_text
 from rig.specification.rigfile import RigFile, parse_rig, read_rig, rig_from_mapping
 from rig.specification.strategies import Strategy
-from solver.limits import Box, HalfSpace, Limits, Sphere
+from solver.limits import Box, HalfSpace, Limits, Roll, Sphere
+from solver.matching import Matching
 
 
 def face() -> dict[str, Any]:
@@ -144,6 +145,22 @@ SWITCHES = {
     ),
     "motion": ({"x_mm": 5.0}, lambda x: x.motion is None),
 }
+
+
+def test_rolls_and_matching_are_read_and_written() -> None:
+    absent = rig_from_mapping(face()).limits
+    assert (absent.roll, absent.matching) == (Limits().roll, Limits().matching)
+    matching = {"max_angle_deg": 30.0, "max_incidence_deg": 60.0, "max_scale_ratio": 1.3}
+    data = put(put(face(), "limits.roll", "level-or-portrait"), "matching", matching)
+    spec = rig_from_mapping(data)
+    assert spec.limits.roll is Roll.LEVEL_OR_PORTRAIT
+    assert spec.limits.matching == Matching(30.0, 60.0, 1.3)
+    again = RigFile.from_spec(spec).to_spec().limits
+    assert (again.roll, again.matching) == (spec.limits.roll, spec.limits.matching)
+    with pytest.raises(InputError, match=r"limits\.roll"):
+        rig_from_mapping(put(face(), "limits.roll", "landscape"))
+    with pytest.raises(InputError, match=r"matching\.max_angle_deg"):
+        rig_from_mapping(put(face(), "matching", {"max_angle_deg": 0.0}))
 
 
 def test_every_limit_has_a_switch() -> None:

@@ -1,0 +1,49 @@
+"""The ``[matching]`` section: what a dense matcher can use."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Self
+
+from pydantic import Field
+
+from common.files.strict import StrictModel
+from solver.matching import Matching
+
+
+class MatchingSection(StrictModel):
+    """Two cameras can match a point that both see, in frame and sharp, within these limits."""
+
+    max_angle_deg: float = Field(
+        default=Matching().max_angle_deg,
+        gt=0.0,
+        le=180.0,
+        description="Greatest angle between the two rays to a point.",
+    )
+    max_incidence_deg: float = Field(
+        default=Matching().max_incidence_deg,
+        gt=0.0,
+        lt=90.0,
+        description="Greatest angle between the point's normal and either ray.",
+    )
+    max_scale_ratio: float = Field(
+        default=Matching().max_scale_ratio,
+        ge=1.0,
+        description="Greatest ratio of the sizes of the two cameras' pixels at a point.",
+    )
+    least_shared: float = Field(
+        default=Matching().least_shared,
+        gt=0.0,
+        le=1.0,
+        description="Share of the points that two cameras must be able to match to be joined: "
+        "cameras that are joined, directly or through others, are a group.",
+    )
+
+    def to_matching(self) -> Matching:
+        """The criteria as the solver sees them."""
+        return Matching(**self.model_dump())
+
+    @classmethod
+    def from_matching(cls, matching: Matching) -> Self:
+        """The section that describes ``matching``."""
+        return cls(**asdict(matching))
