@@ -14,6 +14,8 @@ from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 from common.errors import InputError
 
 PREFIX = "RIGWRIGHT_"
+_OF_COMMANDS = {"RIGWRIGHT_KEY"}
+"""What commands read that ask a service."""
 
 
 def default_data_folder() -> Path:
@@ -148,7 +150,9 @@ def read_settings(**given: object) -> Settings:
     """
     known = {PREFIX + name.upper() for name in Settings.model_fields}
     unknown = sorted(
-        name for name in os.environ if name.upper().startswith(PREFIX) and name.upper() not in known
+        name
+        for name in os.environ
+        if name.upper().startswith(PREFIX) and name.upper() not in known | _OF_COMMANDS
     )
     if unknown:
         raise InputError(

@@ -56,6 +56,26 @@ def lock_file(path: Path, note: str) -> KernelLock:
     return lock
 
 
+def held_note(path: Path) -> tuple[str, int] | None:
+    """What the holder of a lock file wrote into it, and whose file it is (user id).
+
+    None where nobody holds it. Holds it itself for a moment, shared with others who look. Raises
+    :class:`OSError` where it cannot be read.
+    """
+    try:
+        handle = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK)
+    except FileNotFoundError:
+        return None
+    try:
+        fcntl.flock(handle, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return _note(handle), os.fstat(handle).st_uid
+    else:
+        return None
+    finally:
+        os.close(handle)
+
+
 def _opened(path: Path) -> int:
     # A planted link must not make this process write into somebody's file.
     flags = os.O_RDWR | os.O_CLOEXEC | os.O_NOFOLLOW

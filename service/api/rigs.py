@@ -62,7 +62,7 @@ def _document(worker: StationWorker) -> RigStatus:
         status=rig_state(health, doing is not None, problem),
         doing=None if doing is None else at(f"/v1/{_PLURALS[doing.kind]}/{doing.id}"),
         problem=None if problem is None else Problem.model_validate(problem_document(problem)),
-        trigger=trigger_status(health),
+        trigger=trigger_status(health, worker.box_abilities()),
         cameras=camera_statuses(worker.station, health),
         links={
             "self": own,

@@ -25,6 +25,39 @@ StationOption = Annotated[
         "--station", metavar="STATION.toml", help="Box, cameras, outputs.", show_default=False
     ),
 ]
+ServedStationOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--station",
+        metavar="STATION.toml",
+        help="Box, cameras, outputs. A service that runs this rig is asked to do it.",
+        show_default=False,
+    ),
+]
+ServerOption = Annotated[
+    str | None,
+    typer.Option(
+        "--server",
+        metavar="URL",
+        help="The service to ask, such as http://rig-pc:8000; found by itself on this computer.",
+        show_default=False,
+    ),
+]
+KeyOption = Annotated[
+    str | None,
+    typer.Option(
+        "--key", envvar="RIGWRIGHT_KEY", help="A key for the service.", show_default=False
+    ),
+]
+RigNameOption = Annotated[
+    str | None,
+    typer.Option(
+        "--rig",
+        metavar="NAME",
+        help="Which rig of --server, without --station.",
+        show_default=False,
+    ),
+]
 OutOption = Annotated[
     Path, typer.Option("--out", metavar="DIR", help="Folder to write into.", show_default=False)
 ]

@@ -62,6 +62,11 @@ class RigTestRequest(Request):
         bool, Field(description="Whether a `sync-check` writes its delays to the station file.")
     ] = False
     allow_partial: Annotated[bool | None, Field(description="Of a `dry-run`.")] = None
+    shots: Annotated[int, Field(ge=1, le=1000, description="Of a `dry-run`.")] = 1
+    interval_us: Annotated[
+        float,
+        Field(ge=0.0, le=1e9, allow_inf_nan=False, description="From shot to shot of a `dry-run`."),
+    ] = 0.0
 
 
 class CheckLine(Result):

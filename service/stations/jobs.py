@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from common.files.plain import plain
-from rig.acquisition.capture.results import CaptureResult, SelfTest, SyncCheck
+from rig.acquisition.capture.results import CaptureResult, DryRun, SelfTest, SyncCheck
 from rig.acquisition.capture.rig import Rig
 from rig.acquisition.session.records import VerdictEntry
 from rig.acquisition.station.delays import write_timings
@@ -67,8 +67,17 @@ def run_test(
 
 def _dry_run(request: RigTestRequest, rig: Rig, running: Running) -> RigTestOutcome:
     dry = rig.dry_run(
-        allow_partial=request.allow_partial, progress=running.report, cancel=running.cancel
+        shots=request.shots,
+        interval_us=request.interval_us,
+        allow_partial=request.allow_partial,
+        progress=running.report,
+        cancel=running.cancel,
     )
+    return dry_run_outcome(dry)
+
+
+def dry_run_outcome(dry: DryRun) -> RigTestOutcome:
+    """What a dry run found."""
     return RigTestOutcome(
         test="dry-run",
         ok=not dry.faults,

@@ -9,11 +9,25 @@ from common.files.plain import plain
 from rig.acquisition.cameras.base import CameraHealth
 from rig.acquisition.capture.results import RigHealth
 from rig.acquisition.station.spec import CameraPlan, Station
-from rig.acquisition.trigger.box import TriggerState
+from rig.acquisition.trigger.box import TriggerCapabilities, TriggerState
 from service.kinds.base import Figure, Model
 
 _ABLE = (TriggerState.READY, TriggerState.ARMED, TriggerState.FIRING)
 State = Literal["ready", "busy", "degraded", "closed"]
+
+
+class TriggerAbilities(Model):
+    """What a kind of trigger box can do."""
+
+    outputs: int
+    tick_us: float
+    max_delay_us: float
+    max_width_us: float
+    max_shots: int
+    acknowledges_fire: bool
+    edge_log: bool
+    clock: bool
+    dead_man: bool
 
 
 class TriggerStatus(Model):
@@ -31,6 +45,7 @@ class TriggerStatus(Model):
     round_trip_p99_ms: Figure
     counters: dict[str, int]
     last_problem: str
+    capabilities: TriggerAbilities | None = None
 
 
 class CameraStatus(Model):
@@ -46,11 +61,15 @@ class CameraStatus(Model):
     counters: dict[str, int]
 
 
-def trigger_status(health: RigHealth | None) -> TriggerStatus | None:
-    """The trigger box; None where the station has none or is not open."""
+def trigger_status(
+    health: RigHealth | None, can: TriggerCapabilities | None = None
+) -> TriggerStatus | None:
+    """The trigger box and what it ``can``; None where the station has none or is not open."""
     if health is None or health.box is None:
         return None
-    return TriggerStatus.model_validate(plain(health.box))
+    return TriggerStatus.model_validate(
+        {**plain(health.box), "capabilities": None if can is None else plain(can)}
+    )
 
 
 def camera_statuses(station: Station, health: RigHealth | None) -> list[CameraStatus]:

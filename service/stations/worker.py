@@ -18,7 +18,7 @@ from common.progress import Progress, ProgressCallback
 from rig.acquisition.capture.results import RigHealth
 from rig.acquisition.capture.rig import Rig
 from rig.acquisition.station.spec import Station
-from rig.acquisition.trigger.box import TriggerState
+from rig.acquisition.trigger.box import TriggerCapabilities, TriggerState
 from rig.devices.station import open_station
 from service import logs
 from service.jobs.cancels import Cancels
@@ -97,6 +97,11 @@ class StationWorker:
         """How the devices are (None: not open), why they are not open, and what is being done."""
         rig = self._rig
         return (None if rig is None else rig.health()), self._problem, self._doing
+
+    def box_abilities(self) -> TriggerCapabilities | None:
+        """What the trigger box can do; None where there is none or it is not open."""
+        rig = self._rig
+        return None if rig is None or rig.box is None else rig.box.capabilities
 
     def abort(self) -> None:
         """All outputs low, now; what is being done ends. Allowed always, waits for nobody."""

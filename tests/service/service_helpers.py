@@ -7,9 +7,10 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -17,6 +18,7 @@ from typing import TypeVar
 
 import httpx2
 import pytest
+import uvicorn
 from fastapi import FastAPI
 from starlette.testclient import TestClient as StarletteClient
 from typer.testing import CliRunner
@@ -27,6 +29,7 @@ from service.api.app import create_app
 from service.api.context import Service
 from service.cli import app
 from service.cli import running as running_tasks
+from service.client.notes import noted
 from service.ipc import TaskMessage, message_from_line, outcome_line, task_line
 from service.jobs.engine import Running, Task
 from service.kinds.base import RequestT, ResultT
@@ -201,3 +204,23 @@ def small_rig_text() -> str:
         text = text.replace(before, after)
     assert "[subject]" not in text
     return f"{text}\n[subject]\ndesign_points = 40\ncheck_points = 120\n"
+
+
+@contextmanager
+def listening(data: Path, *stations: Path, **settings: object) -> Iterator[str]:
+    """The address of a service of this process that listens, and notes whose rigs it runs."""
+    service = Service(read_settings(data_dir=data, stations=stations, **settings), QUEUED)
+    with ExitStack() as stack:
+        stack.callback(service.close)
+        config = uvicorn.Config(create_app(service), port=0, log_config=None, lifespan="on")
+        server = uvicorn.Server(config)
+        thread = threading.Thread(target=server.run)
+        thread.start()
+        stack.callback(thread.join)
+        stack.callback(setattr, server, "should_exit", True)
+        wait_for(lambda: server.started)
+        url = f"http://127.0.0.1:{server.servers[0].sockets[0].getsockname()[1]}"
+        rigs = service.rigs.all()
+        stack.enter_context(noted(url, [r.station for r in rigs], service.rigs.sessions))
+        wait_for(lambda: all(rig.health()[0] is not None for rig in rigs))
+        yield url

@@ -20,6 +20,8 @@ COMMANDS = (
     ["cameras"],
     ["fake-trigger"],
     ["rig", "check"],
+    ["rig", "status"],
+    ["rig", "abort"],
     ["trigger", "selftest"],
     ["trigger", "reset"],
     ["sessions", "verify"],

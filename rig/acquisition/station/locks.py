@@ -86,7 +86,7 @@ class DeviceLocks:
                 self._folder.mkdir(parents=True, exist_ok=True)
                 # Another user's process must be able to lock, and not to remove, files here.
                 self._folder.chmod(0o1777)
-            return lock_file(self._folder / _file_name(name), _me())
+            return lock_file(self._folder / lock_name(name), _me())
         except LockHeldError as error:
             raise ConflictError(
                 "device-busy",
@@ -117,7 +117,8 @@ class DeviceLocks:
         self.release()
 
 
-def _file_name(name: str) -> str:
+def lock_name(name: str) -> str:
+    """The lock file of what ``name`` stands for: its end can be read, all of it tells it apart."""
     readable = re.sub(r"[^A-Za-z0-9]+", "-", name)[-60:].strip("-")
     return f"{readable}.{hashlib.sha256(name.encode()).hexdigest()[:12]}.lock"
 

@@ -7,19 +7,20 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from service.cli.options import JsonOption, StationOption
+from service.cli.options import (
+    JsonOption,
+    KeyOption,
+    RigNameOption,
+    ServedStationOption,
+    ServerOption,
+)
 
 if TYPE_CHECKING:
-    from rig.acquisition.capture.results import CaptureResult
-    from rig.acquisition.capture.rig import Rig
-    from rig.acquisition.session.folder import Session
-    from service.kinds.rigs import CaptureRequest
-
-SESSIONS = Path("sessions")
+    from service.cli.owner import Taken
 
 
 def capture(
-    station: StationOption,
+    station: ServedStationOption = None,
     session: Annotated[
         Path | None,
         typer.Option(
@@ -59,11 +60,15 @@ def capture(
         float, typer.Option(min=0.0, help="From one capture to the next, to move what is held.")
     ] = 0.0,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Do all but fire.")] = False,
+    server: ServerOption = None,
+    key: KeyOption = None,
+    rig: RigNameOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Fire a rig and file what it photographed, with the proof that it was synchronised.
 
-    Ctrl-C takes all outputs low and files nothing of the capture that is being taken.
+    Ctrl-C takes all outputs low and files nothing of the capture that is being taken. Where a
+    service runs the rig, it is asked, and files in its own sessions.
 
     Exit code: 0 done, 2 bad input, 4 a device is missing or a picture is, 130 interrupted.
 
@@ -74,12 +79,11 @@ def capture(
     from secrets import token_hex
 
     from common.errors import CancelledError, InputError
-    from rig.acquisition.station.stationfile import read_station
-    from rig.devices.station import open_station
     from service.cli.output import show
+    from service.cli.owner import Asked, rig_to_ask
     from service.cli.progress import show_progress
     from service.cli.running import cancel_on_signal, one_line_errors
-    from service.kinds.rigs import CaptureRequest
+    from service.kinds.rigs import CaptureRequest, RigTestRequest
 
     with one_line_errors(), ExitStack() as stack:
         if interval_us and interval_ms:
@@ -102,65 +106,39 @@ def capture(
             )
             for _ in range(count)
         ]
-        opened = stack.enter_context(open_station(read_station(station)))
+        asked = stack.enter_context(rig_to_ask(Asked(station, server, key, rig)))
         cancel = stack.enter_context(cancel_on_signal())
         report = stack.enter_context(show_progress())
         if dry_run:
-            dry = opened.dry_run(
-                shots=shots,
-                interval_us=apart_us,
-                allow_partial=allow_partial,
-                progress=report,
-                cancel=cancel,
+            test = RigTestRequest(
+                test="dry-run", shots=shots, interval_us=apart_us, allow_partial=allow_partial
             )
+            dry = asked.test(test, report, cancel)
             faults = [fault.text for fault in dry.faults]
             show({"ready": list(dry.ready), "faults": faults}, as_json=as_json)
             return
-        filed = stack.enter_context(_session(opened, session, requests[0]))
+        asked.file_in(session, requests[0])
         for number, request in enumerate(requests):
             if number and cancel.wait(pause_s):
                 raise CancelledError
-            result = opened.capture(
-                filed,
-                request.capture_id,
-                shots=request.shots,
-                interval_us=request.interval_us,
-                allow_partial=request.allow_partial,
-                progress=report,
-                cancel=cancel,
-            )
-            _show(result, as_json=as_json)
-            if result.error is not None:
-                raise result.error
+            taken = asked.capture(request, report, cancel)
+            _show(taken, as_json=as_json)
+            if taken.error is not None:
+                raise taken.error
 
 
-def _session(rig: Rig, folder: Path | None, request: CaptureRequest) -> Session:
-    from common.errors import NotFoundError
-    from rig.acquisition.session.folder import Session, session_folder
-
-    if folder is None:
-        new = session_folder(SESSIONS, request.subject)
-        return rig.new_session(new, request.subject, request.operator)
-    try:
-        return Session.open(folder)
-    except NotFoundError:
-        if folder.exists():
-            raise
-        return rig.new_session(folder, request.subject, request.operator)
-
-
-def _show(result: CaptureResult, *, as_json: bool) -> None:
+def _show(taken: Taken, *, as_json: bool) -> None:
     from service.cli.output import show
 
-    record = result.record
+    record = taken.record
     show(
         {
             "capture": record.capture_id,
-            "session": str(result.folder),
+            "session": taken.session,
             "state": record.state,
             "synchronised": record.verdict.text,
             "faults": [fault.text for fault in record.faults],
-            "pictures": [str(result.folder / frame.file.path) for frame in record.frames],
+            "pictures": taken.pictures,
         },
         as_json=as_json,
     )

@@ -52,22 +52,30 @@ def serve(
 
 def run_serve_command(**given: object) -> None:
     """Serve until asked to stop. ``given``: settings that win over the environment."""
+    from contextlib import ExitStack
+
     from service.cli.running import one_line_errors
     from service.settings import read_settings
 
-    with one_line_errors():
+    with one_line_errors(), ExitStack() as stack:
         settings = read_settings(**given)
         # After the settings, so that a mistake in them is told at once.
         from service.api.app import create_app
         from service.api.context import Service
+        from service.client.notes import noted
         from service.kinds.queued import QUEUED
         from service.server import serve
 
         service = Service(settings, QUEUED)
-        try:
-            serve(service, create_app(service), _say_where)
-        finally:
-            service.close()
+        stack.callback(service.close)
+        stations = [worker.station for worker in service.rigs.all()]
+
+        def ready(url: str) -> None:
+            at = f"{url}{settings.root_path}"
+            stack.enter_context(noted(at, stations, settings.sessions_folder))
+            _say_where(url)
+
+        serve(service, create_app(service), ready)
 
 
 def _say_where(url: str) -> None:
