@@ -27,6 +27,7 @@ from service.cli.commands.fake_trigger import fake_trigger
 from service.cli.commands.keys import keys
 from service.cli.commands.plan import plan
 from service.cli.commands.practice import practice
+from service.cli.commands.recognise import recognise
 from service.cli.commands.reconstruct import reconstruct
 from service.cli.commands.rig import rig
 from service.cli.commands.scan import scan
@@ -74,7 +75,7 @@ for command in (
     *(practice, capture, cameras, fake_trigger, serve, backup, restore),
 ):
     app.command(command.__name__.replace("_", "-"))(command)
-for group in (rig, trigger, sessions, keys):
+for group in (rig, trigger, sessions, keys, recognise):
     app.add_typer(group)
 
 

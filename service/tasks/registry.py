@@ -90,6 +90,27 @@ def _trial() -> Work[Any, Any]:
     return Work(TRIAL, trial)
 
 
+def _recognition_training() -> Work[Any, Any]:
+    from service.kinds.recognition import TRAINING
+    from service.tasks.recognising import training
+
+    return Work(TRAINING, training)
+
+
+def _recognition_enrolment() -> Work[Any, Any]:
+    from service.kinds.recognition import ENROLMENT
+    from service.tasks.recognising import enrolment
+
+    return Work(ENROLMENT, enrolment)
+
+
+def _recognition_verification() -> Work[Any, Any]:
+    from service.kinds.recognition import VERIFICATION
+    from service.tasks.recognising import verification
+
+    return Work(VERIFICATION, verification)
+
+
 def _scan_import() -> Work[Any, Any]:
     from service.kinds.imports import SCAN_IMPORT
     from service.tasks.reading import import_scan
@@ -116,6 +137,9 @@ _WORK: dict[str, Callable[[], Work[Any, Any]]] = {
     "reconstruction": _reconstruction,
     "comparison": _comparison,
     "trial": _trial,
+    "recognition-training": _recognition_training,
+    "recognition-enrolment": _recognition_enrolment,
+    "recognition-verification": _recognition_verification,
     "scan-import": _scan_import,
     "picture-import": _pictures_import,
 }
