@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 
@@ -36,6 +36,19 @@ class CancelToken(Protocol):
     def is_set(self) -> bool:
         """Whether the work should stop."""
         ...
+
+
+def within(report: ProgressCallback, low: float, high: float, doing: str = "") -> ProgressCallback:
+    """Progress of a part that goes from ``low`` to ``high`` (0 to 1) of the whole.
+
+    ``doing`` is said before the part's own stages.
+    """
+
+    def tell(inner: Progress, /) -> None:
+        stage = f"{doing}, {inner.stage}" if doing else inner.stage
+        report(replace(inner, stage=stage, fraction=low + (high - low) * inner.fraction))
+
+    return tell
 
 
 def ignore_progress(progress: Progress, /) -> None:

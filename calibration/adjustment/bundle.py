@@ -44,7 +44,7 @@ from calibration.adjustment.result import (
 from calibration.adjustment.stages import NEAR_DAMPING, adjust_in_stages
 from calibration.observations import Observations
 from common.errors import InputError
-from common.progress import CancelToken, Progress, ProgressCallback, ignore_progress
+from common.progress import CancelToken, Progress, ProgressCallback, ignore_progress, within
 from geometry.arrays import Bools, Ints
 
 ROUNDS = 8
@@ -124,7 +124,7 @@ def _adjusted(
     stated, rejected = network.sigma_px, np.empty(0, np.int64)
     noise, own = NoiseModel.stated(network.camera_count), False
     solution = adjust_in_stages(
-        network, state, options.loss, bool(options.start), _later(progress), cancel
+        network, state, options.loss, bool(options.start), within(progress, 0.1, 0.9), cancel
     )
     late: list[LateView] = []
     iterations, near = solution.iterations, replace(options.loss, damping=NEAR_DAMPING)
@@ -163,15 +163,6 @@ def _views(
         )
         for c, p in pairs
     ]
-
-
-def _later(progress: ProgressCallback) -> ProgressCallback:
-    """Progress of an adjustment as the part of a calibration after its start."""
-
-    def tell(inner: Progress, /) -> None:
-        progress(replace(inner, fraction=0.1 + 0.8 * inner.fraction))
-
-    return tell
 
 
 def _result(

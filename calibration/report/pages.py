@@ -73,7 +73,8 @@ def check_page(record: CheckRecord, reference: Calibration | None = None) -> str
         _camera_table(result.cameras),
         f'<p class="note">Load: the pose test over its limit, an alarm above 1 unless a finding '
         "explains it: points tie the cameras together, so where one moves others' tests answer. "
-        "Smallest: what "
+        "At subject: root mean square over what the camera saw; a sentence above gives the "
+        "largest over a face. Smallest: what "
         "this check could have seen of a movement (Baarda, delta0 4.13); "
         f"{result.power95_factor:.1f} times as much is reported in 95 of 100 checks.</p>",
         "<h2>Targets</h2>",

@@ -7,7 +7,6 @@ nearest that the file may have there.
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import json
 from collections.abc import Mapping
 from typing import Annotated, Any, TypeVar, get_args, get_type_hints
@@ -16,6 +15,7 @@ from annotated_types import Len
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
 from common.errors import InputError
+from common.words import did_you_mean
 
 Pair = Annotated[list[float], Len(2, 2)]
 Vector = Annotated[list[float], Len(3, 3)]
@@ -78,10 +78,8 @@ def unknown_key(table: type, location: tuple[int | str, ...]) -> str:
         if isinstance(part, str) and owner is not None and part in _tables(owner):
             owner = _table_in(_tables(owner)[part])
     keys = keys_of(owner) if owner is not None else []
-    close = difflib.get_close_matches(str(location[-1]), keys, 1, 0.5)
-    if close:
-        return f"did you mean {close[0]}?"
-    return f"the keys here are {', '.join(keys)}" if keys else "remove it"
+    otherwise = f"the keys here are {', '.join(keys)}" if keys else "remove it"
+    return did_you_mean(str(location[-1]), keys, otherwise)
 
 
 def _spell(location: tuple[int | str, ...]) -> str:

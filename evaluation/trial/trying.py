@@ -14,6 +14,7 @@ from common.progress import (
     Progress,
     ProgressCallback,
     ignore_progress,
+    within,
 )
 from evaluation.comparison.comparing import Comparison, Within, compare
 from evaluation.comparison.distances import Reference
@@ -77,13 +78,9 @@ def try_rig(
     if surface is None:
         raise InputError("trial-head", "the scene has no head to measure", "give a head")
     views = _photographed(studio, EXPOSURES[exposure], progress, stop)
-    span = RECONSTRUCTED - PHOTOGRAPHED
-
-    def within(inner: Progress, /) -> None:
-        progress(Progress(f"matching, {inner.stage}", PHOTOGRAPHED + span * inner.fraction))
-
+    matching = within(progress, PHOTOGRAPHED, RECONSTRUCTED, "matching")
     chosen = options or ReconstructionOptions()
-    done = reconstruct(views, options=chosen, progress=within, cancel=stop)
+    done = reconstruct(views, options=chosen, progress=matching, cancel=stop)
     progress(Progress("comparing", RECONSTRUCTED))
     truth = Reference(surface.vertices_mm, surface.faces)
     return judged(done, truth, cameras, radius_mm)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import difflib
 from pathlib import Path
 
 from common.errors import ConflictError, NotFoundError
 from common.files.folders import whole_folder
+from common.words import did_you_mean
 from geometry.exchange import (
     blender,
     caliscope,
@@ -47,9 +47,11 @@ def find_format(name: str) -> Format:
     """The export ``name``; raises :class:`NotFoundError` with the nearest name."""
     if name in FORMATS:
         return FORMATS[name]
-    close = difflib.get_close_matches(name.lower(), FORMATS, 1, 0.4)
-    remedy = f"did you mean {close[0]}?" if close else f"choose one of {', '.join(FORMATS)}"
-    raise NotFoundError("export-format", f"there is no export format {name!r}", remedy)
+    raise NotFoundError(
+        "export-format",
+        f"there is no export format {name!r}",
+        did_you_mean(name.lower(), FORMATS),
+    )
 
 
 def export_files(name: str, cameras: Cameras, options: ExportOptions | None = None) -> Files:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import fields
 from typing import Any
 
 from common.errors import InputError
+from common.words import did_you_mean
 from rig.catalogue.catalogue import Catalogue
 from rig.catalogue.items import Adapter, CatalogueCamera, Part
 from rig.catalogue.model import ENTRIES
@@ -67,9 +67,7 @@ def catalogue_rows(
 def _known(word: str, known: list[str], what: str) -> str:
     if word in known:
         return word
-    close = difflib.get_close_matches(word, known, 1, 0.5)
-    remedy = f"did you mean {close[0]}?" if close else f"choose one of {', '.join(known)}"
-    raise InputError("value", f"the catalogue has no {what} {word!r}", remedy)
+    raise InputError("value", f"the catalogue has no {what} {word!r}", did_you_mean(word, known))
 
 
 def _condition(text: str, kinds: list[str]) -> tuple[str, str, str]:

@@ -12,9 +12,8 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Sequence
-from types import TracebackType
-from typing import Self
 
+from common.closing import Closing
 from common.errors import DeviceError, InputError
 from geometry.camera import RigCamera
 from rig.acquisition.cameras.base import CameraInfo
@@ -28,7 +27,7 @@ _REMEMBERED = 256
 """Captures whose reports are remembered, so that a report heard twice fires once."""
 
 
-class SimulatedBackend:
+class SimulatedBackend(Closing):
     """The cameras of a rig, simulated. ``cameras`` as a design file has them; ids are their names.
 
     ``box`` is listened to, if given; :meth:`expose` takes reports from elsewhere. ``clock`` is the
@@ -142,17 +141,6 @@ class SimulatedBackend:
         for device in devices:
             device.close()
         self._pool.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def _check_names(self) -> None:
         if not self._infos:

@@ -6,7 +6,6 @@ import shutil
 import uuid
 from collections.abc import Collection
 from pathlib import Path
-from typing import Self
 
 from alembic import command
 from alembic.config import Config
@@ -14,6 +13,7 @@ from alembic.util import CommandError
 from sqlalchemy import Connection, insert, select
 from sqlalchemy.exc import DatabaseError
 
+from common.closing import Closing
 from common.errors import InputError, InternalError
 from service.ipc import error_fields
 from service.store import idempotency
@@ -39,7 +39,7 @@ def interrupted() -> InternalError:
     )
 
 
-class Store:
+class Store(Closing):
     """A folder with everything the service must not forget.
 
     Opening it takes the folder's lock, brings the schema up to date and puts right what a crash
@@ -90,12 +90,6 @@ class Store:
         """Finish writing and let go of the folder."""
         self.database.close()
         self._lock.release()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
     def _recover(self, settled_elsewhere: Collection[str]) -> None:
         shutil.rmtree(self._work, ignore_errors=True)

@@ -33,7 +33,7 @@ from calibration.report import (
     history_page,
 )
 from calibration.targets.files import read_targets
-from common.progress import Progress, ProgressCallback
+from common.progress import Progress, ProgressCallback, within
 from rig.design.designfile import read_design
 from service.jobs.engine import Running, Task
 from service.kinds.acceptance import AcceptanceRequest, AcceptanceResult
@@ -42,7 +42,6 @@ from service.kinds.calibration import CalibrationRequest, CalibrationResult
 from service.kinds.check import CheckOutcome, CheckRequest
 from service.tasks.measurement_results import acceptance_result, calibration_result, check_result
 from service.tasks.seeing import DETECTING, detection_of, see
-from service.tasks.stages import between
 
 
 def calibration(
@@ -140,7 +139,7 @@ def _name(run: RunContext, inputs: Mapping[str, Path], record: CalibrationRecord
 
 def _after(report: ProgressCallback) -> ProgressCallback:
     """Progress of what follows detection."""
-    return between(report, DETECTING, 0.99)
+    return within(report, DETECTING, 0.99)
 
 
 def _write(path: Path, text: str) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import trimesh
 
-from common.progress import Progress
+from common.progress import Progress, within
 from geometry.head import synthetic_head
 from geometry.preparation import PreparedSubject, prepare_subject
 from geometry.reading import read_scan
@@ -23,7 +23,6 @@ from service.jobs.engine import Running, Task
 from service.kinds.design import Conflict, DemoRequest, DesignRequest, DesignResult
 from service.kinds.evaluation import Coverage, EvaluationRequest, EvaluationResult
 from service.tasks.reading import notes_of
-from service.tasks.stages import between
 from solver.design import design as solve
 from solver.quality import evaluate
 from solver.result import Design, Quality
@@ -100,7 +99,7 @@ def _solved(prepared: PreparedSubject, spec: RigSpec, workers: int, running: Run
         start=spec.start or None,
         strategy=spec.strategy,
         workers=workers,
-        progress=between(running.report, _READING, _DESIGNING),
+        progress=within(running.report, _READING, _DESIGNING),
         cancel=running.cancel,
     )
 

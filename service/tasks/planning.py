@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from common.errors import InputError
-from common.progress import Progress
+from common.progress import Progress, within
 from geometry.preparation import prepare_subject
 from geometry.reading import read_scan
 from rig.build.folder.planfiles import PlanOptions
@@ -28,7 +28,6 @@ from service.kinds.plan import (
     PlanSetting,
     PlanTolerance,
 )
-from service.tasks.stages import between
 
 _PLANNING, _WRITING = 0.05, 0.75
 
@@ -57,7 +56,7 @@ def plan(task: Task[PlanRequest, PlanResult], running: Running) -> PlanResult:
         system,
         name=request.name or read.name,
         seed=request.seed,
-        progress=between(running.report, _PLANNING, _WRITING),
+        progress=within(running.report, _PLANNING, _WRITING),
         cancel=running.cancel,
     )
     options = PlanOptions(
@@ -68,7 +67,7 @@ def plan(task: Task[PlanRequest, PlanResult], running: Running) -> PlanResult:
         step=request.step,
         stock=Stock(request.mount.bar_mm, request.mount.kerf_mm),
     )
-    writing = between(running.report, _WRITING, 1.0)
+    writing = within(running.report, _WRITING, 1.0)
     write_plan(made, task.folder, options, progress=writing, cancel=running.cancel)
     return _result(made)
 

@@ -12,7 +12,7 @@ from calibration.detection.images import read_colour
 from calibration.exports import rig_cameras
 from calibration.files import read_calibration
 from common.errors import InputError
-from common.progress import Progress
+from common.progress import Progress, within
 from evaluation.extras import require_numba
 from evaluation.reconstruction.cloudfile import write_cloud
 from evaluation.reconstruction.meshfile import mesh_glb, mesh_ply
@@ -56,11 +56,8 @@ def reconstruction(
         stride_px=task.request.stride_px, workers=max(task.run.workers, 1)
     )
 
-    def within(inner: Progress, /) -> None:
-        share = READING + (MATCHING - READING) * inner.fraction
-        running.report(Progress(f"matching, {inner.stage}", share))
-
-    done = reconstruct(views, options=options, progress=within, cancel=running.cancel)
+    matching = within(running.report, READING, MATCHING, "matching")
+    done = reconstruct(views, options=options, progress=matching, cancel=running.cancel)
     missing = sorted({c.name for c in cameras} - {v.name for v in views})
     running.report(Progress("meshing", MATCHING))
     mesh = meshed(done.cloud, task.request.cell_mm, options.workers)

@@ -7,9 +7,8 @@ import threading
 import time
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
+from common.closing import Closing
 from common.errors import ConflictError, InputError, RigwrightError
 from common.progress import CancelToken, NeverCancelled, Progress, ProgressCallback, ignore_progress
 from rig.acquisition.capture.devices import DeviceMaker
@@ -54,7 +53,7 @@ from rig.acquisition.trigger.box import TriggerBox
 NEVER = NeverCancelled()
 
 
-class Rig:
+class Rig(Closing):
     """An open station. All methods may be called from any thread; one thing is done at a time.
 
     ``maker`` makes its devices; they are owned until :meth:`close`. ``locks``: where lock files
@@ -98,17 +97,6 @@ class Rig:
     def close(self) -> None:
         """Disarm and let go of everything. Closing twice changes nothing."""
         self._opened.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def health(self) -> RigHealth:
         """How everything is; asks nothing of the devices and never waits."""

@@ -11,9 +11,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 
+from common.closing import Closing
 from common.errors import ConflictError, InputError, NotFoundError
 from common.files.lock import KernelLock, LockHeldError, lock_folder
 from common.version import program_version
@@ -43,7 +43,7 @@ class SessionPlan:
     operator: str = ""
 
 
-class Session:
+class Session(Closing):
     """An open session; one process at a time has it. Closing lets another have it."""
 
     def __init__(self, index: SessionIndex, lock: KernelLock, recovery: Recovery) -> None:
@@ -162,17 +162,6 @@ class Session:
     def close(self) -> None:
         """Let go of it; closing twice changes nothing."""
         self._lock.release()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
 
 def session_folder(root: Path, subject: str, now: datetime | None = None) -> Path:

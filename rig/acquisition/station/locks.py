@@ -14,9 +14,8 @@ import sys
 import tempfile
 from collections.abc import Iterable
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
+from common.closing import Closing
 from common.errors import ConflictError, InputError
 from common.files.lock import KernelLock, LockHeldError, lock_file
 from rig.acquisition.cameras.folder import FolderBackend, FolderOptions, owned
@@ -63,7 +62,7 @@ def _real(url: str) -> str:
     return os.path.realpath(url) if url.startswith("/") else url
 
 
-class DeviceLocks:
+class DeviceLocks(Closing):
     """Locks on devices by name, held until :meth:`release`.
 
     Raises :class:`ConflictError` ``conflict/device-busy`` naming the holder when one is taken;
@@ -77,7 +76,7 @@ class DeviceLocks:
             for name in names:
                 self._held.append(self._take(name))
         except BaseException:
-            self.release()
+            self.close()
             raise
 
     def _take(self, name: str) -> KernelLock:
@@ -100,21 +99,10 @@ class DeviceLocks:
                 "make that folder writable",
             ) from error
 
-    def release(self) -> None:
-        """Let go of all. Releasing twice changes nothing."""
+    def close(self) -> None:
+        """Let go of all. Closing twice changes nothing."""
         while self._held:
             self._held.pop().release()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.release()
 
 
 def lock_name(name: str) -> str:

@@ -20,6 +20,7 @@ from itertools import count
 
 import serial
 
+from common.closing import Closing
 from rig.acquisition.trigger.endpoint import Endpoint
 from rig.acquisition.trigger.faultscript import FaultRates, Incident, ProxyScript, Way
 from rig.acquisition.trigger.serialline import LINE_ERRORS
@@ -45,7 +46,7 @@ class _Direction:
     waiting: list[tuple[float, int, bytes]] = field(default_factory=list)
 
 
-class FaultProxy:
+class FaultProxy(Closing):
     """A running proxy; end it with :meth:`close`.
 
     ``reset`` is how the device is reset, for incidents that do that. ``done`` counts faults.
@@ -109,12 +110,6 @@ class FaultProxy:
         self._device.close()
         os.close(self._wake_read)
         os.close(self._wake_write)
-
-    def __enter__(self) -> FaultProxy:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
     def _tell(self, command: Callable[[], None]) -> None:
         self._commands.append(command)

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from common.closing import Closing
 from common.errors import InputError
 from rig.acquisition.trigger.endpoint import Endpoint, PtyEndpoint, TcpEndpoint
 from rig.acquisition.trigger.fake.device import FakeBox, FakeSettings
@@ -19,7 +20,7 @@ from rig.acquisition.trigger.fake.serving import FakeServer
 
 
 @dataclass(frozen=True)
-class FakeTrigger:
+class FakeTrigger(Closing):
     """A fake box being served: the box, to look at its edges, and the server, to unplug it."""
 
     box: FakeBox
@@ -33,12 +34,6 @@ class FakeTrigger:
     def close(self) -> None:
         """Stop serving it."""
         self.server.close()
-
-    def __enter__(self) -> FakeTrigger:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
 
 def start_fake(

@@ -8,6 +8,7 @@ import threading
 import time
 from typing import Protocol
 
+from common.closing import Closing
 from rig.acquisition.trigger.endpoint import Endpoint
 
 _IDLE_S = 0.5
@@ -29,7 +30,7 @@ class Device(Protocol):
         ...
 
 
-class FakeServer:
+class FakeServer(Closing):
     """Carries bytes between an endpoint and a device until :meth:`close`."""
 
     def __init__(self, device: Device, endpoint: Endpoint) -> None:
@@ -72,12 +73,6 @@ class FakeServer:
         self._endpoint.unplug()
         os.close(self._wake_read)
         os.close(self._wake_write)
-
-    def __enter__(self) -> FakeServer:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
     def _run(self) -> None:
         while not self._closing:

@@ -37,7 +37,7 @@ def test_another_process_is_refused_and_told_who_holds_it(tmp_path: Path) -> Non
         assert error.value.code == "conflict/device-busy"
         assert f"trigger box /dev/ttyX is in use by process {other.pid} on " in str(error.value)
         # What was taken before the refusal has been let go.
-        DeviceLocks(["camera a"], tmp_path).release()
+        DeviceLocks(["camera a"], tmp_path).close()
     finally:
         other.kill()
         other.communicate()
@@ -58,14 +58,14 @@ def test_a_holder_that_has_not_yet_said_its_name(tmp_path: Path) -> None:
     next(tmp_path.iterdir()).write_text("")
     with pytest.raises(ConflictError, match="in use by another process"):
         DeviceLocks(["a"], tmp_path)
-    locks.release()
+    locks.close()
 
 
 def test_a_planted_link_is_not_followed(tmp_path: Path) -> None:
     victim = tmp_path / "victim"
     victim.write_text("precious")
     folder = tmp_path / "locks"
-    DeviceLocks(["a"], folder).release()
+    DeviceLocks(["a"], folder).close()
     lock = next(folder.iterdir())
     lock.unlink()
     lock.symlink_to(victim)
