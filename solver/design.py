@@ -28,7 +28,10 @@ from solver.strategy import Strategy
 
 ENGINE = "sequential quadratic programming with exact second derivatives (PIQP)"
 _EXPECTED_OUTER_ITERATIONS = 8
-_FINE = 4
+_SOLVED = 0.9
+"""Fraction of the work at which all starts are solved."""
+
+_FINE = 2
 """How many networks of the search are optimised continuously."""
 
 _REFINEMENT_COST = 1.01
@@ -133,17 +136,19 @@ def design(
     request = Request(subject, camera, limits, count, seed, starts, fixed, start, strategy)
     token = cancel or NeverCancelled()
     began = time.monotonic()
-    tell = _Teller(progress, starts)
+    tell = _Teller(progress)
     tell.stage("start", 0.0)
     jobs = _searched_jobs(request, token)
+    tell.expect(0, len(jobs))
     results = run_all(jobs, workers, tell.step, token) if jobs else []
     scores = _scores(jobs, results, token)
     if not any(s.feasible for s in scores) or not search_knows(limits):
         more = _jobs(request, len(jobs), token)
+        tell.expect(len(jobs), len(more))
         others = run_all(more, workers, tell.step, token)
         scores += _scores(more, others, token)
         jobs, results = jobs + more, results + others
-    tell.stage("choose", 0.9)
+    tell.stage("choose", _SOLVED)
     best = min(range(len(jobs)), key=lambda k: (*_rank(scores[k]), k))
     problem = jobs[best].problem
     tell.stage("refine", 0.93)
@@ -180,10 +185,15 @@ def design(
 class _Teller:
     """Turns the steps of all starts into one fraction that never falls."""
 
-    def __init__(self, progress: ProgressCallback, starts: int) -> None:
+    def __init__(self, progress: ProgressCallback) -> None:
         self._progress = progress
-        self._done = [0.0] * (starts + _FINE)
-        self._fraction = 0.0
+        self._first, self._done = 0, [0.0]
+        self._fraction = self._begun = 0.0
+
+    def expect(self, first: int, starts: int) -> None:
+        """So many starts are next, the first of them with this index."""
+        self._first, self._done = first, [0.0] * starts
+        self._begun = self._fraction
 
     def stage(self, name: str, fraction: float) -> None:
         self._fraction = max(self._fraction, fraction)
@@ -192,8 +202,10 @@ class _Teller:
     def step(self, start: int, outer: int, iteration: int, cost: float, violation: float) -> None:
         # How many there will be is not known; a start creeps towards its end without passing it.
         share = 1.0 - np.exp(-2.0 * (outer + iteration / 1e3) / _EXPECTED_OUTER_ITERATIONS)
-        self._done[start] = max(self._done[start], float(share))
-        self._fraction = max(self._fraction, 0.9 * sum(self._done) / len(self._done))
+        at = start - self._first
+        self._done[at] = max(self._done[at], float(share))
+        done = sum(self._done) / len(self._done)
+        self._fraction = max(self._fraction, self._begun + (_SOLVED - self._begun) * done)
         self._progress(Progress("solve", self._fraction, start, iteration, cost, violation))
 
 

@@ -122,7 +122,8 @@ class Problem:
     @cached_property
     def spheres(self) -> tuple[tuple[Floats, Floats], ...]:
         """Per camera the covering spheres in the solver's units: centres (m, 3), radii (m,)."""
-        covers = {id(c.camera): sphere_cover(c.camera.body) for c in self.cameras}
+        kinds = {id(c.camera): c.camera for c in self.cameras}
+        covers = {k: sphere_cover(camera.body) for k, camera in kinds.items()}
         scale = self.length_mm
         return tuple(
             (covers[id(c.camera)][0] / scale, covers[id(c.camera)][1] / scale) for c in self.cameras

@@ -20,7 +20,7 @@ from solver.outer_loop import StartResult
 from solver.problem import Problem
 
 _RADIUS = 0.02
-_MAX_STEPS, _MAX_ROUGH_STEPS = 120, 40
+_MAX_STEPS, _MAX_ROUGH_STEPS, _MAX_NEAR_STEPS = 120, 25, 60
 _PASSES = 3
 _TIGHT, _TIGHT_NEAR = 1e-6, 3e-5
 """Errors of the optimality conditions to end with. Of many views held each, the rows bend so often
@@ -42,11 +42,11 @@ def refine(problem: Problem, result: StartResult, cancel: CancelToken) -> Outcom
         cuts = VisibilityCuts.none()
         found, known = values, None
         rough = result.reach != FAR
-        tolerance = _TIGHT_NEAR if rough else _TIGHT
+        tolerance, most_steps = (_TIGHT_NEAR, _MAX_NEAR_STEPS) if rough else (_TIGHT, _MAX_STEPS)
         for k in range(_PASSES):
             rough = rough and k + 1 < _PASSES
             program = _program(problem, values, seen, cuts)
-            outcome = _pass(program, found, known, tolerance, rough, cancel)
+            outcome = _pass(program, found, known, tolerance, rough, most_steps, cancel)
             found, known = outcome.values, outcome.multipliers
             after = problem.unknowns.state(found)
             lost = cuts_for_hidden(problem, after, seen.assigned, opening)
@@ -68,6 +68,7 @@ def _pass(
     known: list[Floats] | None,
     tolerance: float,
     rough: bool,
+    most_steps: int,
     cancel: CancelToken,
 ) -> Outcome:
     return minimise(
@@ -77,7 +78,7 @@ def _pass(
         tolerance=tolerance,
         gain_tolerance=_ROUGH_GAIN if rough else _GAIN,
         known=known,
-        max_iterations=_MAX_ROUGH_STEPS if rough else _MAX_STEPS,
+        max_iterations=_MAX_ROUGH_STEPS if rough else most_steps,
         radius=_RADIUS,
     )
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from common.errors import CancelledError
 from common.progress import CancelToken, NeverCancelled
-from geometry.arrays import Bools, Floats
+from geometry.arrays import Bools, Floats, Ints
 from geometry.camera import Camera, RigCamera
 from geometry.frames import Pose, look_at_rotation
 from geometry.subject import Subject
@@ -28,8 +28,9 @@ STEP_DEG = 6.0
 WIDEST_DEG = 80.0
 """Candidates stand up to this far from the mean normal of the subject."""
 
-MOST_POINTS = 500
-"""Check points that the search weighs; the continuous solve and the evaluation use all."""
+HARDEST, OTHERS = 300, 300
+"""Check points that the search weighs: those that fewest candidates see, which decide a network,
+and some of all others, which count for more. The continuous solve and the evaluation use all."""
 
 _LEAST_SEEN = 3
 _ROOM = 1.01
@@ -41,13 +42,15 @@ class Candidates:
     """Cameras that could stand somewhere, the rig's fixed ones last.
 
     ``information`` (m, 6, p) of each camera's ray to each point, in 1/mm2 (xx, yy, zz, xy, xz,
-    yz), zero where it does not see it; ``seen`` (m, p); ``position_mm`` (m, 3); ``distance_mm``
-    (m,) to the centroid; ``fixed`` how many of the last are there already.
+    yz), zero where it does not see it; ``seen`` (m, p); ``share`` (p,) of all check points that
+    each point stands for; ``position_mm`` (m, 3); ``distance_mm`` (m,) to the centroid;
+    ``fixed`` how many of the last are there already.
     """
 
     cameras: tuple[RigCamera, ...]
     information: Floats
     seen: Bools
+    share: Floats
     prior: float
     position_mm: Floats
     distance_mm: Floats
@@ -55,6 +58,11 @@ class Candidates:
 
     def __len__(self) -> int:
         return len(self.cameras)
+
+    @property
+    def free(self) -> int:
+        """How many of the first are to be chosen from."""
+        return len(self.cameras) - self.fixed
 
     @property
     def base_height(self) -> Floats:
@@ -68,12 +76,6 @@ class Candidates:
         """Distances (m, m) of the projection centres."""
         return np.asarray(
             np.linalg.norm(self.position_mm[:, None] - self.position_mm[None], axis=2)
-        )
-
-    def of_points(self, every: int) -> Candidates:
-        """The same cameras weighed on every so many of the points."""
-        return replace(
-            self, information=self.information[:, :, ::every], seen=self.seen[:, ::every]
         )
 
 
@@ -96,6 +98,24 @@ def directions(facing: Floats, step_deg: float = STEP_DEG) -> Floats:
     return np.array(out)
 
 
+def directions_about(centres: Floats, step_deg: float) -> Floats:
+    """Unit vectors (13 m, 3): those given (m, 3), and two rings of six about each.
+
+    The rings are ``step_deg`` and twice that away, turned by half a step from each other.
+    """
+    out = []
+    for centre in centres:
+        side = np.cross(centre, np.eye(3)[np.abs(centre).argmin()])
+        side /= np.linalg.norm(side)
+        up = np.cross(side, centre)
+        out.append(centre)
+        for ring in (1, 2):
+            away, turn = np.radians(ring * step_deg), np.pi * (np.arange(6) + 0.5 * ring) / 3.0
+            across = np.cos(turn)[:, None] * side + np.sin(turn)[:, None] * up
+            out += list(np.cos(away) * centre + np.sin(away) * across)
+    return np.array(out)
+
+
 def candidates(
     subject: Subject,
     camera: Camera,
@@ -103,21 +123,22 @@ def candidates(
     fixed: tuple[RigCamera, ...] = (),
     cancel: CancelToken | None = None,
     step_deg: float = STEP_DEG,
+    outward: Floats | None = None,
 ) -> Candidates:
     """Cameras around the subject, each as near as frame and focus allow for what it sees.
 
-    They aim at the centroid, level or upright, whichever lets them stand closer. Those that a
-    zone forbids are left out. Raises :class:`CancelledError` soon after ``cancel`` is set.
+    They stand ``step_deg`` apart all around it, or in the directions ``outward`` (m, 3). They aim
+    at the centroid, level or upright, whichever lets them stand closer. Those that a zone
+    forbids are left out. Raises :class:`CancelledError` soon after ``cancel`` is set.
     """
-    points = _thinned(subject.check_points, MOST_POINTS)
     middle = subject.design_points.centroid_mm
-    facing = subject.design_points.normals.mean(axis=0)
-    length = float(np.linalg.norm(facing))
-    outward = directions(facing / length if length > 1e-6 else np.array([0.0, -1.0, 0.0]), step_deg)
+    if outward is None:
+        outward = directions(_facing(subject), step_deg)
     far = limits.stand_off.max_mm or 10.0 * subject.design_points.radius_mm
     guess = min(far, max(limits.stand_off.min_mm or 0.0, 6.0 * subject.design_points.radius_mm))
     token = cancel or NeverCancelled()
     found: list[RigCamera] = []
+    often = np.zeros(len(subject.check_points), dtype=np.int64)
     for direction in outward:
         if token.is_set():
             raise CancelledError
@@ -126,18 +147,36 @@ def candidates(
         sees = _sight(subject.check_points, subject, limits, eye, NEAR.framed_deg)[0]
         if sees.sum() < _LEAST_SEEN:
             continue
+        often += sees
         seen_mm = subject.check_points.points_mm[sees]
         pose = _pose(camera, limits, seen_mm, direction, middle)
         found.append(camera_at(camera, f"at{len(found)}", pose, seen_mm))
     found = _where_allowed(subject, limits, found)
-    whole = replace(subject, design_points=points)
-    return _weighed(whole, limits, (*found, *fixed), len(fixed), middle)
+    chosen, share = _weighed_points(often)
+    whole = replace(subject, design_points=subject.check_points.subset(chosen))
+    return _weighed(whole, share, limits, (*found, *fixed), len(fixed), middle)
 
 
-def _thinned(points: SurfacePoints, most: int) -> SurfacePoints:
-    """At most so many of the points, evenly through their order, which is random."""
-    step = max(1, len(points) // most)
-    return points.subset(np.arange(0, len(points), step))
+def _facing(subject: Subject) -> Floats:
+    """Mean normal (3,) of the subject, or towards the cameras where normals cancel out."""
+    mean = subject.design_points.normals.mean(axis=0)
+    length = float(np.linalg.norm(mean))
+    return np.asarray(mean / length if length > 1e-6 else np.array([0.0, -1.0, 0.0]))
+
+
+def _weighed_points(often: Ints) -> tuple[Ints, Floats]:
+    """Which points are weighed, and the share of all that each stands for, by how often seen.
+
+    Their order is random, so that every so many of them are a fair sample.
+    """
+    order = np.argsort(often, kind="stable")
+    hard, others = order[:HARDEST], np.sort(order[HARDEST:])
+    others = others[:: max(1, len(others) // OTHERS)]
+    weight = np.ones(len(hard) + len(others))
+    weight[len(hard) :] = (len(often) - len(hard)) / max(1, len(others))
+    chosen = np.concatenate([hard, others])
+    back = np.argsort(chosen, kind="stable")
+    return chosen[back], weight[back] / len(often)
 
 
 def _pose(camera: Camera, limits: Limits, points_mm: Floats, away: Floats, middle: Floats) -> Pose:
@@ -174,11 +213,17 @@ def _where_allowed(subject: Subject, limits: Limits, cameras: list[RigCamera]) -
 
 
 def _weighed(
-    subject: Subject, limits: Limits, cameras: tuple[RigCamera, ...], fixed: int, middle: Floats
+    subject: Subject,
+    share: Floats,
+    limits: Limits,
+    cameras: tuple[RigCamera, ...],
+    fixed: int,
+    middle: Floats,
 ) -> Candidates:
     if not cameras:
-        empty = np.zeros((0, 6, len(subject.design_points)))
-        return Candidates((), empty, empty[:, 0] > 0.0, 0.0, np.zeros((0, 3)), np.zeros(0), 0)
+        empty = np.zeros((0, 6, len(share)))
+        nobody = empty[:, 0] > 0.0
+        return Candidates((), empty, nobody, share, 0.0, np.zeros((0, 3)), np.zeros(0), 0)
     problem = Problem(subject, cameras, limits)
     centres = np.stack([c.pose.position_rig_mm for c in cameras])
     seen = _sight(subject.design_points, subject, limits, centres)
@@ -189,4 +234,4 @@ def _weighed(
     information = ray_information(state, problem.points, weight) / problem.length_mm**2
     distance = np.linalg.norm(centres - middle, axis=1)
     prior = problem.prior / problem.length_mm**2
-    return Candidates(cameras, information, seen, prior, centres, distance, fixed)
+    return Candidates(cameras, information, seen, share, prior, centres, distance, fixed)

@@ -61,8 +61,7 @@ class Search:
         if self.limits.sight_line_clearance_mm is not None:
             out |= in_each_others_view(pool.cameras, self.limits.sight_line_clearance_mm)
         # What stands already is not for the search to judge: every network has it.
-        first_fixed = len(pool) - pool.fixed
-        out[first_fixed:, first_fixed:] = False
+        out[pool.free :, pool.free :] = False
         np.fill_diagonal(out, val=True)
         return out
 
@@ -81,21 +80,29 @@ class Search:
         pool = self.candidates
         entries = pool.information[network].sum(axis=0)
         entries[:3] += pool.prior
-        cost = covariance_norms(entries).mean()
+        cost = covariance_norms(entries) @ pool.share
         factor = self._shortfall_factor(pool.seen[network].sum(axis=0))
         return int(self._broken_with_each(network[:-1])[network[-1]]), float(cost * factor)
 
-    def scores_with_each(self, rest: Ints) -> tuple[Ints, Floats]:
-        """Rules broken (m,) and cost (m,) of the network ``rest`` with each candidate added."""
+    def scores_with_each(self, rest: Ints, at_least: int = 1) -> tuple[Ints, Floats]:
+        """Rules broken (m,) and cost (m,) of the network ``rest`` with each free candidate added.
+
+        The cost is infinite where more rules are broken than by the ``at_least`` best.
+        """
         pool = self.candidates
         base = pool.information[rest].sum(axis=0)
         base[:3] += pool.prior
-        cost = np.empty(len(pool))
-        for first in range(0, len(pool), _AT_A_TIME):
-            some = slice(first, first + _AT_A_TIME)
-            cost[some] = covariance_norms(base[None] + pool.information[some]).mean(axis=1)
-        count = pool.seen[rest].sum(axis=0)[None] + pool.seen
-        return self._broken_with_each(rest), cost * self._shortfall_factor(count)
+        count = pool.seen[rest].sum(axis=0)
+        broken = self._broken_with_each(rest)
+        free = broken[: pool.free]
+        most = np.sort(free)[min(at_least, len(free)) - 1]
+        cost = np.full(len(pool), np.inf)
+        worth = np.flatnonzero(free <= most)
+        for first in range(0, len(worth), _AT_A_TIME):
+            some = worth[first : first + _AT_A_TIME]
+            norms = covariance_norms(base[None] + pool.information[some])
+            cost[some] = (norms @ pool.share) * self._shortfall_factor(count + pool.seen[some])
+        return broken, cost
 
     def _broken_with_each(self, rest: Ints) -> Ints:
         among = self.too_close[np.ix_(rest, rest)]
@@ -111,12 +118,12 @@ class Search:
         """By how much (...) the cost is raised for views lacking among the counts (..., p)."""
         lack = np.zeros(count.shape[:-1])
         for tier in self.limits.coverage.tiers:
-            lack = np.maximum(lack, tier.share - (count >= tier.views).mean(axis=-1))
+            lack = np.maximum(lack, tier.share - (count >= tier.views) @ self.candidates.share)
         return np.asarray(1.0 + _COVERAGE_WEIGHT * lack)
 
     def best_addition(self, rest: Ints) -> int:
         """The free candidate that helps a network most."""
-        return _least(*self.scores_with_each(rest), len(self.candidates) - self.candidates.fixed)
+        return _least(*self.scores_with_each(rest), self.candidates.free)
 
     @property
     def fixed(self) -> Ints:
@@ -133,7 +140,7 @@ class Search:
     def exchanged(self, network: Ints, passes: int = 12) -> Ints:
         """Each free camera in turn put where it helps most, until none moves."""
         network = network.copy()
-        free_candidates = len(self.candidates) - self.candidates.fixed
+        free_candidates = self.candidates.free
         best = self.score(network)
         for _ in range(passes):
             moved = False

@@ -16,7 +16,8 @@ def in_each_others_view(cameras: tuple[RigCamera, ...], clearance_mm: float) -> 
     As the limit on sight lines has it: a body's spheres must all be clear of one and the same
     side of the view, or lie behind the camera.
     """
-    covers = {id(c.camera): sphere_cover(c.camera.body) for c in cameras}
+    kinds = {id(c.camera): c.camera for c in cameras}
+    covers = {k: sphere_cover(camera.body) for k, camera in kinds.items()}
     bodies = [covers[id(c.camera)] for c in cameras]
     reach = np.array([(np.linalg.norm(o, axis=1) + r).max() for o, r in bodies])
     centres = np.stack([c.pose.position_rig_mm for c in cameras])

@@ -39,8 +39,11 @@ from solver.strategy import Strategy
 
 @pytest.fixture(scope="module", autouse=True)
 def coarser_candidates() -> Iterator[None]:
-    """Fewer candidates than the search's own, for speed."""
+    """Fewer candidates and shakes than the search's own, for speed."""
     with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(exchange, "SHAKES", 10)
+        patch.setattr(exchange, "FINER_SHAKES", 5)
+        patch.setattr(exchange, "FINER_DEG", (3.0,))
         patch.setattr(exchange, "candidates", partial(candidates, step_deg=10.0))
         yield
 

@@ -17,7 +17,16 @@ from solver.information import normal_matrices
 from solver.limits import BaseHeight, Coverage, CoverageTier, HalfSpace, StandOff, Zones
 from solver.problem import Problem
 from solver.quality import evaluate
-from solver.search.candidates import WIDEST_DEG, Candidates, candidates, directions
+from solver.search.candidates import (
+    HARDEST,
+    OTHERS,
+    WIDEST_DEG,
+    Candidates,
+    _weighed_points,
+    candidates,
+    directions,
+    directions_about,
+)
 from solver.search.exchange import exchange
 from solver.search.networks import Search, covariance_norms
 
@@ -40,6 +49,7 @@ def some(count: int, seed: int = 0) -> Candidates:
         tuple(whole.cameras[k] for k in chosen),
         whole.information[chosen],
         whole.seen[chosen],
+        whole.share,
         whole.prior,
         whole.position_mm[chosen],
         whole.distance_mm[chosen],
@@ -93,6 +103,34 @@ def test_directions_are_evenly_spread_about_the_facing_side() -> None:
     assert (nearest < 1.05 * STEP_DEG).all()
 
 
+def test_finer_directions_lie_in_two_rings_about_the_given_ones() -> None:
+    given = np.array([[0.6, -0.8, 0.0], [0.0, 0.0, 1.0]])
+    found = directions_about(given, 3.0).reshape(2, 13, 3)
+    for centre, ring in zip(given, found, strict=True):
+        away = np.degrees(np.arccos(np.clip(ring @ centre, -1.0, 1.0)))
+        # An arc cosine near 1 loses half of the sixteen digits.
+        np.testing.assert_allclose(np.sort(away), [0.0] + 6 * [3.0] + 6 * [6.0], atol=1e-5)
+        gaps = np.degrees(np.arccos(np.clip(ring @ ring.T - 2.0 * np.eye(13), -1.0, 1.0)))
+        assert gaps.min() > 2.9
+
+
+def test_points_that_fewest_see_are_weighed_one_by_one_and_the_others_stand_for_all() -> None:
+    often = np.random.default_rng(2).permutation(5000)
+    chosen, share = _weighed_points(often)
+    hardest = np.flatnonzero(often < HARDEST)
+    assert set(hardest.tolist()) <= set(chosen.tolist())
+    np.testing.assert_allclose(share[np.isin(chosen, hardest)], 1.0 / 5000.0)
+    assert share.sum() == pytest.approx(1.0)
+    assert (np.diff(chosen) > 0).all()
+    assert OTHERS <= len(chosen) - HARDEST <= 2 * OTHERS
+
+
+def test_few_points_are_all_weighed_alike() -> None:
+    chosen, share = _weighed_points(np.zeros(120, np.int64))
+    np.testing.assert_array_equal(chosen, np.arange(120))
+    np.testing.assert_allclose(share, 1.0 / 120.0)
+
+
 def test_a_candidate_alone_holds_frame_focus_and_stand_off() -> None:
     subject = rigs.face(60, 120)
     for k in range(0, len(pool()), 17):
@@ -143,7 +181,7 @@ def test_no_single_exchange_helps_an_exchanged_network(seed: int) -> None:
 def test_the_exchange_finds_the_best_of_all_networks_of_a_small_pool(seed: int) -> None:
     search = Search(some(12, seed), LIMITS)
     best = min(search.score(np.array(n)) for n in combinations(range(12), 3))
-    found = exchange(search, search, 3, 0, NeverCancelled(), shakes=20)
+    found = exchange(search, 3, 0, NeverCancelled(), shakes=20)
     assert found[0].score[0] == best[0]
     assert found[0].score[1] == pytest.approx(best[1], rel=1e-9)
     assert [f.score for f in found] == sorted(f.score for f in found)
@@ -170,7 +208,7 @@ def test_fixed_cameras_stay_in_every_network() -> None:
     assert with_old.fixed == 1
     assert with_old.cameras[-1] is old
     search = Search(with_old, LIMITS)
-    for found in exchange(search, search, 2, 0, NeverCancelled(), shakes=2):
+    for found in exchange(search, 2, 0, NeverCancelled(), shakes=2):
         assert len(found.network) == 3
         assert (found.network == len(with_old) - 1).sum() == 1
 

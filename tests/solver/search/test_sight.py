@@ -40,7 +40,8 @@ def pool_of(cameras: tuple[RigCamera, ...], fixed: int) -> Candidates:
     place = np.stack([c.pose.position_rig_mm for c in cameras])
     nothing, count = np.zeros((len(cameras), 6, 2)), len(cameras)
     seen = np.zeros((count, 2), dtype=np.bool_)
-    return Candidates(cameras, nothing, seen, 0.1, place, np.linalg.norm(place, axis=1), fixed)
+    share, away = np.full(2, 0.5), np.linalg.norm(place, axis=1)
+    return Candidates(cameras, nothing, seen, share, 0.1, place, away, fixed)
 
 
 def test_pairs_are_those_that_break_the_limit() -> None:
