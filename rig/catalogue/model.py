@@ -214,9 +214,9 @@ class ProfileEntry(Entry):
 class BracketEntry(Entry):
     """A bracket or joint."""
 
-    kind: Literal["corner", "pivot", "head-plate", "clamp", "stand", "end-cap"] = Field(
+    kind: Literal["corner", "pivot", "head-plate", "clamp", "stand", "end-cap", "strip"] = Field(
         description="Kind of bracket; a stand carries a head over the floor, an end cap closes a "
-        "profile."
+        "profile, a strip joins two where they meet at an angle."
     )
     series: list[Words] = Field(description="Profile series it fits.")
     size_mm: Vector | None = Field(

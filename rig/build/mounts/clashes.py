@@ -14,6 +14,9 @@ ROUNDING_MM = 0.05
 """A gap this much short of what was asked is no clash: round parts are modelled too large."""
 
 CAMERA_KINDS = ("camera", "lens")
+FIXED_KINDS = ("member", "plate", "bracket", "joint")
+"""Of these nothing moves: a bracket or a pivot may touch what is bolted beside it."""
+
 Joined = frozenset[frozenset[str]]
 """Pairs of owners that are bolted together and may touch."""
 
@@ -29,6 +32,9 @@ def required_mm(one: Solid, other: Solid, joined: Joined, around: Surroundings) 
         return None
     if one.kind in CAMERA_KINDS and other.kind in CAMERA_KINDS:
         return around.limits.body_clearance_mm or 0.0
+    kinds = (one.kind, other.kind)
+    if "joint" in kinds and all(kind in FIXED_KINDS for kind in kinds):
+        return 0.0
     return around.clearance_mm
 
 
@@ -126,6 +132,17 @@ class Site:
         """Put a part in its place."""
         self._solids += solids
         self._crowd.add([ConvexShape(solid.corners_mm) for solid in solids])
+
+    def between(self, solids: tuple[Solid, ...], others: tuple[Solid, ...], joined: Joined) -> int:
+        """How many clashes two parts that are not yet in their places would have."""
+        crowd, count = Crowd([ConvexShape(solid.corners_mm) for solid in others]), 0
+        for solid in solids:
+            shape = ConvexShape(solid.corners_mm)
+            for k in crowd.near(shape, self._around.clearance_mm):
+                need = required_mm(solid, others[k], joined, self._around)
+                if need is not None:
+                    count += gap_mm(shape, crowd.shapes[k], need) < need - ROUNDING_MM
+        return count
 
     def clashes(self, solids: tuple[Solid, ...], joined: Joined) -> int:
         """How many clashes these solids would bring, with ``extra_mm`` of room to move."""

@@ -17,6 +17,10 @@ STEP_SCALE_MM = 3.0
 HARD = 300.0
 """Weight of a limit against moving: a breach of 0.1 % weighs as much as 1 mm."""
 
+MOST_STEPS = 100
+GAIN, LEAST_SHARE = 1e-4, 1e-9
+"""Of a Newton step: what must come of the gain that its slope promises, and its shortest part."""
+
 CENTRED = 0.9
 """Largest margin in an equality, as a share of its tolerance: beyond it lies the other side."""
 
@@ -106,18 +110,27 @@ def _least_move(lack: Floats, jacobian: Floats) -> Floats:
     """The least move (m,) that gains ``lack`` (r,) where it is positive, in least squares.
 
     Minimises |move / scale|^2 + HARD^2 |max(0, lack - J move)|^2 by Newton steps on the set of
-    rows that still lack something; the objective is convex and piecewise quadratic.
+    rows that still lack something; the objective is convex and piecewise quadratic. Steps are
+    shortened until they gain: whole ones can go round in a circle.
     """
     count = jacobian.shape[1]
     move: Floats = np.zeros(count)
     inertia = np.eye(count) / STEP_SCALE_MM**2
-    active = lack > 0.0
-    for _ in range(50):
+
+    def price(tried: Floats) -> float:
+        short = np.maximum(0.0, lack - jacobian @ tried)
+        return float(tried @ inertia @ tried + HARD**2 * short @ short)
+
+    for _ in range(MOST_STEPS):
+        active = lack - jacobian @ move > 0.0
         rows = HARD * jacobian[active]
         system = inertia + rows.T @ rows
-        move = np.asarray(np.linalg.solve(system, HARD * rows.T @ lack[active]))
-        now = lack - jacobian @ move > 0.0
-        if (now == active).all():
+        step = np.linalg.solve(system, HARD * rows.T @ lack[active]) - move
+        # Half of the slope along a Newton step is minus its own length in the system's norm.
+        slope, share, here = float(step @ system @ step), 1.0, price(move)
+        while price(move + share * step) > here - GAIN * share * slope and share > LEAST_SHARE:
+            share /= 2.0
+        move = np.asarray(move + share * step)
+        if share == 1.0 and ((lack - jacobian @ move > 0.0) == active).all():
             break
-        active = now
     return move

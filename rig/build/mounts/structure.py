@@ -18,8 +18,8 @@ from geometry.arrays import Floats, frozen
 class Solid:
     """A convex solid: ``corners_mm`` (K, 3). ``owner`` is the member, part or camera it is of.
 
-    ``kind``: ``member``, ``plate``, ``bracket``, ``head``, ``wedge``, ``camera``, ``lens`` or
-    ``cable``.
+    ``kind``: ``member``, ``plate``, ``bracket``, ``joint`` (a corner bracket or a pivot with its
+    screws), ``head``, ``wedge``, ``camera``, ``lens`` or ``cable``.
     """
 
     owner: str
@@ -142,13 +142,17 @@ class Wedge:
 
 @dataclass(frozen=True, eq=False)
 class PlacedPart:
-    """A bought part in its place: ``rig_from_part`` (4, 4). ``camera`` when it serves one only."""
+    """A bought part in its place: ``rig_from_part`` (4, 4). ``camera`` when it serves one only.
+
+    ``joint``: the id of the joint that a bracket or a pivot is of.
+    """
 
     id: str
     part: str
     role: str
     rig_from_part: Floats
     camera: str = ""
+    joint: str = ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "rig_from_part", frozen(self.rig_from_part))
@@ -161,7 +165,7 @@ class Joint:
     ``along_mm``: from the start of ``on`` to the middle of the joint, None where ``on`` is no
     member.
     ``angle_deg``: the angle that is set there, None where there is nothing to set.
-    ``fasteners``: catalogue entry to count.
+    ``fasteners``: catalogue entry to count. Brackets and pivots that are placed are not among them.
     """
 
     id: str

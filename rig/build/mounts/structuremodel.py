@@ -167,6 +167,7 @@ class PartModel(StrictModel):
     role: str
     rig_from_part: Transform
     camera: str
+    joint: str = ""
 
     @classmethod
     def of(cls, placed: PlacedPart) -> Self:
@@ -175,7 +176,8 @@ class PartModel(StrictModel):
 
     def made(self) -> PlacedPart:
         """What it describes."""
-        return PlacedPart(self.id, self.part, self.role, np.array(self.rig_from_part), self.camera)
+        at = np.array(self.rig_from_part)
+        return PlacedPart(self.id, self.part, self.role, at, self.camera, self.joint)
 
 
 class JointModel(StrictModel):

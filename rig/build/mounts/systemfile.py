@@ -21,7 +21,13 @@ from rig.build.mounts.surroundings import Zone
 from rig.build.mounts.systems.arc import ArcSystem
 from rig.build.mounts.systems.base import MountSystem
 from rig.build.mounts.systems.heads import HeadKind
-from rig.build.mounts.systems.parts import outrigger_of, plate_of, profile_named, stand_named
+from rig.build.mounts.systems.parts import (
+    bracket_for,
+    outrigger_of,
+    plate_of,
+    profile_named,
+    stand_named,
+)
 from rig.build.mounts.systems.threads import adapter_for
 from rig.build.mounts.systems.tripods import TripodSystem
 from rig.build.mounts.systems.tslot import TSlotSystem
@@ -168,7 +174,8 @@ class SystemFile(StrictModel):
             return TripodSystem(stand, head, adapter, self.floor_step_mm, self.slot_step_mm)
         parts = outrigger_of(profile, head, catalogue)
         if self.kind == "arc":
-            return ArcSystem(parts, self.slot_step_mm, self.share_mm, self.radius_mm)
+            strip = bracket_for(profile, "strip", catalogue)
+            return ArcSystem(parts, strip, self.slot_step_mm, self.share_mm, self.radius_mm)
         return TSlotSystem(parts, self.slot_step_mm, self.share_mm)
 
 

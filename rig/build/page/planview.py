@@ -23,6 +23,7 @@ KINDS: dict[str, tuple[str, str, int]] = {
     "member": ("#9aa7b8", "profiles and tubes", 0),
     "plate": ("#b9c2cf", "plates", 0),
     "bracket": ("#c98f3c", "brackets", 1),
+    "joint": ("#e0a458", "corner brackets and pivots", 0),
     "wedge": ("#2f9e8f", "printed wedges", 1),
     "head": ("#5b4b8a", "heads", 2),
     "camera": (BODY, "cameras", 3),

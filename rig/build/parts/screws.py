@@ -107,7 +107,8 @@ def _tapped(joint: Joint, structure: Structure, catalogue: Catalogue) -> bool:
 
 def _through_mm(joint: Joint, structure: Structure, catalogue: Catalogue) -> float | None:
     """What lies between a screw's head and its thread."""
-    brackets = [b for b in map(catalogue.brackets.get, joint.fasteners) if b is not None]
+    with_it = [*joint.fasteners, *(p.part for p in structure.parts if p.joint == joint.id)]
+    brackets = [b for b in map(catalogue.brackets.get, with_it) if b is not None]
     if brackets:
         return _leg_mm(brackets[0])
     for plate in structure.plates:

@@ -143,8 +143,10 @@ def _hung(
             masses.of_camera(mount.camera),
         )
     for part in structure.parts:
-        if part.camera in holders:
-            hang(holders[part.camera], part.rig_from_part[:3, 3], masses.of_part(part.part))
+        held = next((n for (j, _), n in stood.node_of_joint.items() if j == part.joint), None)
+        node = holders.get(part.camera, held)
+        if node is not None:
+            hang(node, part.rig_from_part[:3, 3], masses.of_part(part.part))
     cameras = {wedge.id: wedge.camera for wedge in structure.wedges}
     for solid in structure.solids:
         if solid.kind == "wedge" and cameras.get(solid.owner) in holders:

@@ -20,14 +20,17 @@ from geometry.camera import RigCamera
 from rig.build.mounts.clashes import pairs
 from rig.build.mounts.settings import CameraMount, Tape
 from rig.build.mounts.solids import bar, camera_solids, lens_front
-from rig.build.mounts.structure import Joint, Member, Solid, Structure
+from rig.build.mounts.structure import Joint, Member, PlacedPart, Solid, Structure
 from rig.build.mounts.surroundings import Surroundings
 from rig.build.mounts.systems.base import Built
+from rig.build.mounts.systems.corners import leg_mm, unplaced, with_corners
 from rig.build.mounts.systems.hanging import Rail, hang_all
 from rig.build.mounts.systems.heads import HeadKind
 from rig.build.mounts.systems.outrigger import Hung, Outrigger, Z
-from rig.build.mounts.systems.ribs import Facet, Rib
-from rig.build.mounts.systems.stays import stayed
+from rig.build.mounts.systems.pivots import pivot_arm_mm, pivot_part
+from rig.build.mounts.systems.ribs import Facet, Rib, bend_id, strips
+from rig.build.mounts.systems.stays import Stays, stayed
+from rig.catalogue.items import Bracket
 
 BEHIND_MM = 90.0
 END_DEG = 10.0
@@ -41,6 +44,8 @@ STRUT_MM = 30.0
 
 TURNS_DEG = (0.0, 3.0, -3.0, 6.0, -6.0, 10.0, -10.0)
 FOOT_MM = (300.0, 120.0)
+BESIDE_MM = 4.0
+"""Between a bracket and the pivot over it."""
 
 
 class _Ribs:
@@ -77,17 +82,21 @@ class _Ribs:
     def solids(self, rail: Rail) -> tuple[Solid, ...]:
         if not isinstance(rail, Facet) or rail.rib in self.ribs:
             return ()
-        return tuple(facet.solid() for facet in rail.rib.facets)
+        bends = (solid for _, solid in strips(rail.rib, self._system.strip))
+        return (*(facet.solid() for facet in rail.rib.facets), *bends)
 
 
 @dataclass(frozen=True, eq=False)
 class ArcSystem:
     """Ribs on uprights. ``radius_mm`` None: as small as the cameras allow.
 
+    ``strip`` joins facets where they meet.
+
     ``stays``: with a stay behind each upright.
     """
 
     outrigger: Outrigger
+    strip: Bracket
     step_mm: float
     share_mm: float
     radius_mm: float | None = None
@@ -183,8 +192,8 @@ class ArcHolding:
         facets = [facet for rib in self.ribs for facet in rib.facets]
         props = [m for rib in self.ribs for m in self._props(rib)]
         bars = self._base_bars()
-        stays, stay_joints = self._stays()
-        props += stays
+        stays = self._stays()
+        props += stays.members
         members = [f.member() for f in facets] + props + bars
         members += [m for h in self.hung for m in h.members()]
         solids = [facet.solid() for facet in facets]
@@ -193,16 +202,24 @@ class ArcHolding:
             for m in (*props, *bars)
         ]
         solids += [s for h in self.hung for s in (*h.solids(), *camera_solids(h.mount.camera))]
+        solids += stays.solids
         joints = [j for rib in self.ribs for j in self._joints(rib)] + self._base_joints(bars)
-        joints += stay_joints
+        placed, more = self._pivots(joints, bars)
+        solids += more
+        joints += stays.joints
         joints += [j for h in self.hung for j in h.joints(h.mount.values()["along"])]
         touching = [p for h in self.hung for p in h.touching()] + [(j.on, j.other) for j in joints]
-        # Feet and base bars meet at the uprights.
-        floor = [m.id for m in (*props, *bars) if m.role in ("foot", "base bar")]
-        touching += [(a, b) for a in floor for b in floor if a < b]
-        parts = tuple(p for h in self.hung for p in h.placed())
+        ends = {joint.id: (joint.on, joint.other) for joint in joints}
+        touching += [(part.id, end) for part in placed for end in ends[part.joint]]
+        touching += stays.touching()
+        parts = (*(p for h in self.hung for p in h.placed()), *placed, *stays.parts)
         structure = Structure(tuple(members), (), (), parts, tuple(joints), tuple(solids))
-        return Built(structure, tuple(self._measured(h) for h in self.hung), pairs(*touching))
+        mounts = tuple(self._measured(h) for h in self.hung)
+        structure, joined = with_corners(
+            structure, pairs(*touching), self.system.outrigger.corner,
+            tuple(m.camera for m in mounts), self.around,
+        )  # fmt: skip
+        return Built(structure, mounts, joined, unplaced(structure, self.system.outrigger.corner))
 
     def _measured(self, hung: Hung) -> CameraMount:
         rib = next(r for r in self.ribs if hung.rail.startswith(f"{r.id}."))
@@ -222,7 +239,8 @@ class ArcHolding:
         """The upright behind a rib, its foot, and a strut to each end of the rib."""
         profile = rib.profile
         size = (profile.width_mm, profile.height_mm)
-        back = -(rib.radius_mm + 1.5 * profile.height_mm)
+        back = float((rib.axes.T @ (self._hinge(rib)[1] - rib.centre_mm))[1])
+        back -= self._arm_mm + profile.height_mm / 2.0
         floor = self.around.floor_z_mm - rib.centre_mm[2]
         high = float(rib.corner(rib.count)[2] - rib.centre_mm[2])
 
@@ -231,7 +249,10 @@ class ArcHolding:
             name = f"{rib.id} {role}"
             return Member(name, profile.id, role.split()[-1], axis, rib.axes[:, 0], size)
 
-        top = floor + float(np.ceil(max(high, 0.0) + 2.0 * profile.height_mm - floor))
+        # Over the upper strut there is a bracket.
+        strut = float(self._strut_end(rib.facets[-1])[2] - rib.centre_mm[2])
+        strut += profile.height_mm / 2.0 + leg_mm(self.system.outrigger.corner)[0] + BESIDE_MM
+        top = floor + float(np.ceil(max(max(high, 0.0) + 2.0 * profile.height_mm, strut) - floor))
         out = [member("upright", [0.0, back, floor], [0.0, back, top])]
         foot, aside = floor + profile.height_mm / 2.0, profile.width_mm
         out.append(
@@ -239,40 +260,85 @@ class ArcHolding:
         )
         front = back + profile.height_mm / 2.0
         for role, facet in (("lower strut", rib.facets[0]), ("upper strut", rib.facets[-1])):
-            end = rib.axes.T @ (self._strut_end(rib, facet) - rib.centre_mm)
-            length = np.floor(float(end[1]) - front)
+            end = rib.axes.T @ (self._strut_end(facet) - rib.centre_mm)
+            length = np.floor(float(end[1]) - self._arm_mm - front)
             if length > profile.height_mm and end[2] > floor + 3.0 * profile.height_mm:
                 z = float(end[2])
                 out.append(member(role, [0.0, front, z], [0.0, front + float(length), z]))
         return out
 
-    def _strut_end(self, rib: Rib, facet: Facet) -> Floats:
-        """The axis of the pivot joint on a facet's rear, near the end of its rib, (3,)."""
+    @property
+    def _arm_mm(self) -> float:
+        return pivot_arm_mm(self.system.outrigger.pivot)
+
+    def _hinge(self, rib: Rib) -> tuple[Facet, Floats]:
+        """The facet that is bolted to the upright, the nearest to it, and the pin between, (3,)."""
+        nearest = min(rib.facets, key=lambda f: abs(float(f.middle_mm[2] - rib.centre_mm[2])))
+        return nearest, self._behind(nearest, nearest.length_mm / 2.0)
+
+    def _behind(self, facet: Facet, along_mm: float) -> Floats:
+        """The pin of a pivot joint on a facet's rear, (3,)."""
+        at = facet.at(along_mm)
+        return np.asarray(at[:3, 3] - (facet.size_mm[1] / 2.0 + self._arm_mm) * at[:3, 1])
+
+    def _strut_end(self, facet: Facet) -> Floats:
+        """The pin of the pivot joint near the end of its rib, (3,)."""
         along = STRUT_MM if facet.index == 0 else facet.length_mm - STRUT_MM
-        joint = (self.system.outrigger.pivot.size_mm or (20.0, 40.0, 20.0))[1]
-        at = facet.at(along)
-        return np.asarray(at[:3, 3] - (rib.profile.height_mm / 2.0 + joint) * at[:3, 1])
+        return self._behind(facet, along)
+
+    def _pivots(
+        self, joints: list[Joint], bars: list[Member]
+    ) -> tuple[list[PlacedPart], list[Solid]]:
+        """The pivots of ribs, struts and base bars, and the strips at the bends of ribs."""
+        pivot = self.system.outrigger.pivot
+        of = {joint.id: joint for joint in joints}
+        made = []
+        for rib in self.ribs:
+            pin, forward = rib.axes[:, 0], rib.axes[:, 1]
+            facet, place = self._hinge(rib)
+            ways = (-forward, facet.at(0.0)[:3, 1])
+            made.append(pivot_part(of[f"{rib.id} a"], pivot, place, pin, ways))
+            for strut, end in self._struts(rib):
+                joint, place = of[f"{strut.id} b"], self._strut_end(end)
+                made.append(pivot_part(joint, pivot, place, pin, (-forward, end.at(0.0)[:3, 1])))
+        for member, ribs in zip(bars, pairwise(self._row()), strict=True):
+            for end, (mark, rib) in enumerate(zip("ab", ribs, strict=True)):
+                _, normal, pin_mm = self._bar_pin(rib, ribs[1 - end])
+                way = member.axis_mm[end] - pin_mm
+                ways = (-normal, way / np.linalg.norm(way))
+                made.append(pivot_part(of[f"{member.id} {mark}"], pivot, pin_mm, Z, ways))
+        parts = [part for part, _ in made]
+        solids = [solid for _, halves in made for solid in halves]
+        for rib in self.ribs:
+            for part, solid in strips(rib, self.system.strip):
+                parts.append(part)
+                solids.append(solid)
+        return parts, solids
+
+    def _struts(self, rib: Rib) -> list[tuple[Member, Facet]]:
+        """The struts of a rib with the facet that each leads to."""
+        _, _, *struts = self._props(rib)
+        return [(s, rib.facets[0 if "lower" in s.id else -1]) for s in struts]
 
     def _joints(self, rib: Rib) -> list[Joint]:
         """Facet to facet, upright to rib, foot to upright, struts between."""
         parts = self.system.outrigger
         two = {parts.corner.id: 2, parts.screw: 4, parts.t_nut: 4}
-        pivot = {parts.pivot.id: 1, parts.screw: 2, parts.t_nut: 2}
-        upright, foot, *struts = self._props(rib)
+        pivot = {parts.screw: 4, parts.t_nut: 4}
+        strip = {parts.screw: 4, parts.t_nut: 4}
+        upright, foot, *_ = self._props(rib)
         bend = (rib.high_deg - rib.low_deg) / rib.count
         out = [
-            Joint(f"{b.id} bend", a.id, b.id, b.ends_mm[0], a.length_mm, bend, pivot)
+            Joint(bend_id(b), a.id, b.id, b.ends_mm[0], a.length_mm, bend, strip)
             for a, b in pairwise(rib.facets)
         ]
-        # The facet that comes nearest to the upright is bolted to it.
-        nearest = min(rib.facets, key=lambda f: abs(float(f.middle_mm[2] - rib.centre_mm[2])))
-        level = float(nearest.middle_mm[2] - upright.axis_mm[0, 2])
+        nearest, pin = self._hinge(rib)
+        level = float(pin[2] - upright.axis_mm[0, 2])
         out += [
-            Joint(f"{rib.id} a", upright.id, nearest.id, nearest.middle_mm, level, None, pivot),
+            Joint(f"{rib.id} a", upright.id, nearest.id, pin, level, nearest.lean_deg, pivot),
             Joint(f"{rib.id} b", foot.id, upright.id, upright.axis_mm[0], FOOT_MM[0], None, two),
         ]
-        for strut in struts:
-            facet = rib.facets[0] if "lower" in strut.id else rib.facets[-1]
+        for strut, facet in self._struts(rib):
             ends, along = strut.axis_mm, float(strut.axis_mm[0, 2] - upright.axis_mm[0, 2])
             out += [
                 Joint(f"{strut.id} a", upright.id, strut.id, ends[0], along, None, two),
@@ -281,15 +347,13 @@ class ArcHolding:
             ]  # fmt: skip
         return out
 
-    def _stays(self) -> tuple[list[Member], list[Joint]]:
+    def _stays(self) -> Stays:
         """A sill on each foot and a stay for each upright, where the arc has them."""
-        members: list[Member] = []
-        joints: list[Joint] = []
+        made = Stays()
         for rib in self.ribs if self.system.stays else ():
             upright, foot = self._props(rib)[:2]
-            more, held = stayed(rib.id, [upright], [foot], self.system.outrigger.stay_parts)
-            members, joints = members + more, joints + held
-        return members, joints
+            made += stayed(rib.id, [upright], [foot], self.system.outrigger.stay_parts)
+        return made
 
     def _row(self) -> list[Rib]:
         return sorted(self.ribs, key=lambda rib: rib.turn_deg)
@@ -298,34 +362,46 @@ class ArcHolding:
         """Bars from upright to upright, over their feet."""
         out = []
         for k, (one, other) in enumerate(pairwise(self._row()), 1):
-            ends = [self._props(rib)[0].axis_mm[0] for rib in (one, other)]
             profile = one.profile
-            along = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
-            # Bars meet the uprights at any angle: on pivots, clear of their edges.
-            joint = (self.system.outrigger.pivot.size_mm or (20.0, 40.0, 20.0))[1]
-            lift = 1.5 * profile.height_mm * Z
-            gap = (joint + float(np.hypot(profile.width_mm, profile.height_mm)) / 2.0) * along
-            axis = np.stack([ends[0] + lift + gap, ends[1] + lift - gap])
+            pins = [self._bar_pin(one, other)[2], self._bar_pin(other, one)[2]]
+            along = (pins[1] - pins[0]) / np.linalg.norm(pins[1] - pins[0])
+            # Cut to a whole millimetre; what is missing is in the pivots, half at each end.
+            half = np.floor(np.linalg.norm(pins[1] - pins[0]) - 2.0 * self._arm_mm) / 2.0
+            middle = (pins[0] + pins[1]) / 2.0
+            axis = np.stack([middle - half * along, middle + half * along])
             size = (profile.width_mm, profile.height_mm)
             across = np.cross(Z, along)
             out.append(Member(f"base bar {k}", profile.id, "base bar", axis, across, size))
         return out
 
+    def _bar_pin(self, rib: Rib, other: Rib) -> tuple[float, Floats, Floats]:
+        """Height of a bar's pin over the floor, the face of the upright it is on, the pin (3,).
+
+        On the face that looks most towards the other upright, over the bracket on the foot.
+        """
+        parts = self.system.outrigger
+        foot, far = (self._props(r)[0].axis_mm[0] for r in (rib, other))
+        normals = [sign * rib.axes[:, k] for k in (0, 1) for sign in (1.0, -1.0)]
+        normal = max(normals, key=lambda n: float(n @ (far - foot)))
+        depth = rib.profile.width_mm if abs(normal @ rib.axes[:, 0]) > 0.5 else (
+            rib.profile.height_mm
+        )  # fmt: skip
+        width = (parts.pivot.size_mm or (20.0, 40.0, 20.0))[0]
+        lift = rib.profile.height_mm + leg_mm(parts.corner)[0] + width / 2.0 + BESIDE_MM
+        return lift, normal, foot + lift * Z + (depth / 2.0 + self._arm_mm) * normal
+
     def _base_joints(self, bars: list[Member]) -> list[Joint]:
         parts = self.system.outrigger
-        pivot = {parts.pivot.id: 1, parts.screw: 2, parts.t_nut: 2}
-        return [
-            Joint(f"{member.id} {mark}", f"{rib.id} upright", member.id, member.axis_mm[end],
-                  1.5 * rib.profile.height_mm, _bar_angle_deg(member, rib), pivot)
-            for member, ribs in zip(bars, pairwise(self._row()), strict=True)
-            for end, (mark, rib) in enumerate(zip("ab", ribs, strict=True))
-        ]  # fmt: skip
-
-
-def _bar_angle_deg(member: Member, rib: Rib) -> float:
-    """How far a bar is turned from the line across a rib."""
-    along = (member.axis_mm[1] - member.axis_mm[0]) / member.length_mm
-    return float(np.degrees(np.arccos(np.clip(abs(along @ rib.axes[:, 0]), 0.0, 1.0))))
+        pivot = {parts.screw: 4, parts.t_nut: 4}
+        out = []
+        for member, ribs in zip(bars, pairwise(self._row()), strict=True):
+            for end, (mark, rib) in enumerate(zip("ab", ribs, strict=True)):
+                lift, normal, pin = self._bar_pin(rib, ribs[1 - end])
+                along = (member.axis_mm[1] - member.axis_mm[0]) / member.length_mm
+                angle = float(np.degrees(np.arccos(np.clip(abs(along @ normal), 0.0, 1.0))))
+                out.append(Joint(f"{member.id} {mark}", f"{rib.id} upright", member.id, pin, lift,
+                                 angle, pivot))  # fmt: skip
+        return out
 
 
 def _whole_facets(radius_mm: float, half_rad: float) -> float:

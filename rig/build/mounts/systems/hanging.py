@@ -73,7 +73,13 @@ class Rails(Protocol):
 class _Option:
     hung: Hung
     rail: Rail
-    solids: tuple[Solid, ...]
+    rail_solids: tuple[Solid, ...]
+    own: tuple[Solid, ...]
+
+    @property
+    def solids(self) -> tuple[Solid, ...]:
+        """All that it adds."""
+        return (*self.rail_solids, *self.own)
 
 
 def hang_all(
@@ -92,7 +98,9 @@ def hang_all(
     for index in order:
         best: tuple[int, _Option] | None = None
         for option in _options(cameras[index], rails, parts, step_mm):
-            count = site.clashes(option.solids, _touching(option))
+            joined = _touching(option)
+            count = site.clashes(option.solids, joined)
+            count += site.between(option.own, option.rail_solids, joined)
             if best is None or count < best[0]:
                 best = (count, option)
             if count == 0:
@@ -124,7 +132,7 @@ def _options(
             for side in (1, -1):
                 hung = _hang(camera, rail, parts, step_mm, stance, side)
                 if hung is not None:
-                    yield _Option(hung, rail, (*rails.solids(rail), *hung.solids()))
+                    yield _Option(hung, rail, rails.solids(rail), hung.solids())
 
 
 def _hang(

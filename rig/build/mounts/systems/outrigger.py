@@ -18,7 +18,9 @@ from rig.build.mounts.kinematics import frames_along, rotated, standing
 from rig.build.mounts.settings import CameraMount, Link, Motion, Setting, shift, turn
 from rig.build.mounts.solids import bar, box, carried
 from rig.build.mounts.structure import Joint, Member, PlacedPart, Solid
+from rig.build.mounts.systems.corners import leg_mm
 from rig.build.mounts.systems.heads import HeadKind, head_id
+from rig.build.mounts.systems.pivots import pivot_arm_mm, pivot_part
 from rig.build.mounts.systems.stays import StayParts
 from rig.build.mounts.systems.threads import counted, height_mm
 from rig.catalogue.items import Bracket, Fastener, Profile
@@ -29,7 +31,7 @@ PITCHES_DEG = (0.0, 30.0, -30.0, 60.0, -60.0)
 SHORTEST_ARM_MM = 10.0
 LONGEST_ARM_MM = 900.0
 LONGEST_STUB_MM = 400.0
-STUB_END_MM = 15.0
+STUB_END_MM = 5.0
 """How far a stub reaches past the last bracket on it."""
 
 
@@ -90,15 +92,10 @@ class Outrigger:
     def base(self, foot: HeadFooting) -> Floats:
         """The head's foot (4, 4) from the front end of the arm's middle line."""
         _, length, thick = self.plate_mm
-        joint = 0.0 if foot.pitch_deg == 0.0 else self.joint_mm
-        under = (self._half_along(foot.face) + joint) * foot.face - length / 2.0 * Y
+        arm = 0.0 if foot.pitch_deg == 0.0 else pivot_arm_mm(self.pivot)
+        under = (self._half_along(foot.face) + arm) * foot.face - length / 2.0 * Y
         rotation = foot.rotation()
-        return rotated(rotation, under + (thick + height_mm(self.adapter)) * rotation[:, 2])
-
-    @property
-    def joint_mm(self) -> float:
-        """Height of a pivot joint, from the arm to its axis."""
-        return (self.pivot.size_mm or (20.0, 40.0, 20.0))[1]
+        return rotated(rotation, under + (arm + thick + height_mm(self.adapter)) * rotation[:, 2])
 
     def _half_along(self, face: Floats) -> float:
         width, height = self.size_mm
@@ -165,9 +162,10 @@ class Hung:
         at, front = self.rig_from_rail, self.arm_front()
         stub_y = self.parts.stub_y_mm(self.rail_size_mm[1])
         half_rail, half_arm = self.rail_size_mm[0] / 2.0, part.width_mm / 2.0
+        past = leg_mm(self.parts.corner)[0] + STUB_END_MM
         ends = (
-            min(-half_rail, values["across"] - half_arm) - STUB_END_MM,
-            max(half_rail, values["across"] + half_arm) + STUB_END_MM,
+            min(-half_rail, values["across"] - half_arm) - past,
+            max(half_rail, values["across"] + half_arm) + past,
         )
         low = float(np.floor(ends[0]))
         stub_axis = np.array([[low, stub_y, 0.0], [low + np.ceil(ends[1] - low), stub_y, 0.0]])
@@ -182,7 +180,7 @@ class Hung:
         )
 
     def placed(self) -> tuple[PlacedPart, ...]:
-        """Plate and head."""
+        """Plate and head, and the pivot under a plate that is pitched."""
         foot = self.arm_front() @ self.parts.base(self.foot)
         under = self.parts.plate_mm[2] + height_mm(self.parts.adapter)
         plate = foot @ shift(np.array([0.0, 0.0, -under]))
@@ -190,7 +188,18 @@ class Hung:
         return (
             PlacedPart(f"{name} plate", self.parts.plate.id, "head plate", plate, name),
             PlacedPart(head_id(name), self.parts.head.part.id, "head", foot, name),
+            *(part for part, _ in self._pivot(plate)),
         )
+
+    def _pivot(self, plate: Floats) -> list[tuple[PlacedPart, tuple[Solid, Solid]]]:
+        """The pivot between arm and plate ``plate`` (4, 4), where there is one."""
+        if self.foot.pitch_deg == 0.0:
+            return []
+        up, pin = plate[:3, 2], plate[:3, 0]
+        down = -self.arm_front()[:3, :3] @ self.foot.face
+        at = plate[:3, 3] - pivot_arm_mm(self.parts.pivot) * up
+        joint = Joint(f"{self.mount.name} c", self.arm_id, f"{self.mount.name} plate", at)
+        return [pivot_part(joint, self.parts.pivot, at, pin, (down, up), self.mount.name)]
 
     def solids(self) -> tuple[Solid, ...]:
         """Stub, arm, plate and head."""
@@ -204,18 +213,19 @@ class Hung:
             box(
                 plate.id, "bracket", plate.rig_from_part, -half, half + np.array([0.0, 0.0, thick])
             ),
+            *(solid for _, halves in self._pivot(plate.rig_from_part) for solid in halves),
             *self.parts.head.solids(self.mount),
         )
 
     def joints(self, rail_along_mm: float) -> tuple[Joint, ...]:
         """Stub on rail, arm on stub, plate on arm, head on plate, camera on head."""
         stub, arm = self.members()
-        plate, head = self.placed()
+        plate, head, *pivot = self.placed()
         bolts = {self.parts.screw: 2, self.parts.t_nut: 2}
         two = {self.parts.corner.id: 2, self.parts.screw: 4, self.parts.t_nut: 4}
         pitch = self.foot.pitch_deg
         if pitch != 0.0:
-            bolts = {self.parts.pivot.id: 1, self.parts.screw: 4, self.parts.t_nut: 4}
+            bolts = {self.parts.screw: 4, self.parts.t_nut: 4}
         on_rail = self.rig_from_rail[:3, 3]
         across = self.mount.values()["across"]
         middle = on_rail + self.rig_from_rail[:3, :3] @ np.array(
@@ -229,7 +239,7 @@ class Hung:
             Joint(f"{name} a", self.rail, stub.id, on_rail, rail_along_mm, None, two),
             Joint(f"{name} b", stub.id, arm.id, middle, along, None, two),
             Joint(
-                f"{name} c", arm.id, plate.id, plate.rig_from_part[:3, 3],
+                f"{name} c", arm.id, plate.id, (pivot[0] if pivot else plate).rig_from_part[:3, 3],
                 arm.length_mm - self.parts.plate_mm[1] / 2.0, pitch or None, bolts,
             ),
             Joint(f"{name} d", plate.id, head.id, head.rig_from_part[:3, 3], None, None,
@@ -241,7 +251,9 @@ class Hung:
     def touching(self) -> tuple[tuple[str, str], ...]:
         """Pairs of owners that touch by intent."""
         name, plate, head = self.mount.name, f"{self.mount.name} plate", head_id(self.mount.name)
+        pivot = f"{name} c pivot"
         return (
+            (self.arm_id, pivot), (plate, pivot),
             (self.rail, self.stub_id), (self.rail, self.arm_id), (self.stub_id, self.arm_id),
             (self.arm_id, plate), (plate, head), (self.arm_id, head), (head, name), (plate, name),
         )  # fmt: skip

@@ -23,12 +23,13 @@ from rig.build.mounts.clashes import Site, pairs
 from rig.build.mounts.kinematics import rotated
 from rig.build.mounts.settings import CameraMount, Tape
 from rig.build.mounts.solids import bar, box, camera_solids, carried, lens_front
-from rig.build.mounts.structure import Hole, Joint, Member, PlacedPart, Plate, Structure
+from rig.build.mounts.structure import Hole, Joint, Member, Plate, Structure
 from rig.build.mounts.surroundings import Surroundings
 from rig.build.mounts.systems.base import Built
+from rig.build.mounts.systems.corners import unplaced, with_corners
 from rig.build.mounts.systems.fits import CAMERA_SCREW, SCREW_HOLES_MM, Fitter, WedgeFit
 from rig.build.mounts.systems.posts import LONGEST_POST_MM, Posted, X, Y, Z, post_for
-from rig.build.mounts.systems.stays import StayParts, stayed
+from rig.build.mounts.systems.stays import StayParts, Stays, stayed
 from rig.build.mounts.tolerancing import MADE_DEG, MADE_MM
 from rig.catalogue import Catalogue
 from rig.catalogue.items import Bracket, Profile
@@ -156,26 +157,32 @@ class PlateHolding:
         low, high = self._extent()
         plate = self._plate(low, high)
         stand = self._stand(low, high)
-        stays, stay_joints = self._stays(stand)
-        members = (*stand, *stays, *(p.member() for p in self.posted))
+        stays = self._stays(stand)
+        members = (*stand, *stays.members, *(p.member() for p in self.posted))
         thick = self.system.thickness_mm
         solids = [box("plate", "plate", self.face, np.append(low, -thick), np.append(high, 0.0))]
         solids += [
             bar(m.id, "member", m.axis_mm[0], m.axis_mm[1], m.across, m.size_mm)
-            for m in (*stand, *stays)
+            for m in (*stand, *stays.members)
         ]
         solids += [s for p in self.posted for s in (*p.solids(), *camera_solids(p.mount.camera))]
+        solids += stays.solids
         wedges = tuple(p.wedge() for p in self.posted)
         joints = (
             *self._stand_joints(stand),
-            *stay_joints,
+            *stays.joints,
             *(j for p in self.posted for j in self._joints(p)),
         )
         touching = [t for p in self.posted for t in p.touching()]
         touching += [("plate", p.post_id) for p in self.posted] + [(j.on, j.other) for j in joints]
-        parts: tuple[PlacedPart, ...] = ()
-        structure = Structure(members, (plate,), wedges, parts, joints, tuple(solids))
-        return Built(structure, tuple(self._measured(p) for p in self.posted), pairs(*touching))
+        touching += stays.touching()
+        structure = Structure(members, (plate,), wedges, stays.parts, joints, tuple(solids))
+        mounts = tuple(self._measured(p) for p in self.posted)
+        structure, joined = with_corners(
+            structure, pairs(*touching), self.system.corner, tuple(m.camera for m in mounts),
+            self.around,
+        )  # fmt: skip
+        return Built(structure, mounts, joined, unplaced(structure, self.system.corner))
 
     def _extent(self) -> tuple[Floats, Floats]:
         """Least and greatest corner of the plate in its own plane, whole centimetres."""
@@ -231,13 +238,14 @@ class PlateHolding:
         half = profile.width_mm
         z = floor + 2.0 * profile.height_mm
         axis = carried(self.face, np.array([[high[0] - half, z, depth], [low[0] + half, z, depth]]))
-        out.append(Member("cross bar", profile.id, "cross bar", axis, Z, size[::-1]))
+        # Its broad side level: so its slots lie on those of the uprights, for the brackets.
+        out.append(Member("cross bar", profile.id, "cross bar", axis, Z, size))
         return out
 
-    def _stays(self, stand: list[Member]) -> tuple[list[Member], list[Joint]]:
+    def _stays(self, stand: list[Member]) -> Stays:
         """A sill and a stay for each upright, where the plate has them."""
         if not self.system.stays:
-            return [], []
+            return Stays()
         system, (left, left_foot, right, right_foot, _) = self.system, stand
         parts = StayParts(system.profile, system.corner, system.pivot, system.screw, system.t_nut)
         return stayed("of the plate", [left, right], [left_foot, right_foot], parts)

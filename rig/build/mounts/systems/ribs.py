@@ -4,19 +4,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
 from geometry.arrays import Floats
 from rig.build.mounts.kinematics import frame
 from rig.build.mounts.settings import Link, Motion, Setting, shift, turn
-from rig.build.mounts.solids import carried
-from rig.build.mounts.structure import Member, Solid
+from rig.build.mounts.solids import box, carried
+from rig.build.mounts.structure import Member, PlacedPart, Solid
 from rig.build.mounts.systems.outrigger import Z
-from rig.catalogue.items import Profile
+from rig.catalogue.items import Bracket, Profile
 
-CORNER_MM = 20.0
-"""How far from a corner of the polygon stubs stay, for the joint."""
+CORNER_SIZES = 2.1
+"""How far from a corner of the polygon the middle of a stub stays, in sizes of the profile: the
+strips over the joint reach 1.5 of them, the stub half of one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,9 +105,9 @@ class Facet:
 
     def setting(self) -> Setting:
         """Length of facet from its lower corner to the stub."""
+        free = CORNER_SIZES * self.size_mm[1]
         return Setting(
-            "along", "mm", self.length_mm / 2.0, self.rib.step_mm, CORNER_MM,
-            self.length_mm - CORNER_MM,
+            "along", "mm", self.length_mm / 2.0, self.rib.step_mm, free, self.length_mm - free,
             f"the lower corner of {self.id} to the middle of the stub",
         )  # fmt: skip
 
@@ -146,3 +148,33 @@ class Facet:
             for y in (-depth / 2.0, depth / 2.0)
         ])  # fmt: skip
         return Solid(self.id, "member", carried(self._start(), corners))
+
+
+def bend_id(upper: Facet) -> str:
+    """Id of the joint at the lower end of a facet."""
+    return f"{upper.id} bend"
+
+
+def strips(rib: Rib, strip: Bracket) -> list[tuple[PlacedPart, Solid]]:
+    """The strips at all bends of a rib."""
+    return [made for lower, upper in pairwise(rib.facets) for made in _bend(lower, upper, strip)]
+
+
+def _bend(lower: Facet, upper: Facet, strip: Bracket) -> list[tuple[PlacedPart, Solid]]:
+    """The strips on both sides of a bend, each with a screw into either facet.
+
+    They lie along the chord from screw to screw, which cuts the corner on the inner side.
+    """
+    width, length, thick = strip.size_mm or (20.0, 60.0, 4.0)
+    screw = length / 2.0 - width / 2.0
+    along = [lower.at(lower.length_mm - screw)[:3, 3], upper.at(screw)[:3, 3]]
+    chord = (along[1] - along[0]) / np.linalg.norm(along[1] - along[0])
+    middle, out = (along[0] + along[1]) / 2.0, []
+    for k, side in enumerate((1.0, -1.0), 1):
+        normal = side * lower.rib.axes[:, 0]
+        at = frame(middle + lower.size_mm[0] / 2.0 * normal, np.cross(chord, normal), chord, normal)
+        joint = bend_id(upper)
+        part = PlacedPart(f"{joint} strip {k}", strip.id, "joining strip", at, joint=joint)
+        half = np.array([width / 2.0, length / 2.0, 0.0])
+        out.append((part, box(part.id, "joint", at, -half, half + np.array([0.0, 0.0, thick]))))
+    return out

@@ -22,10 +22,11 @@ from rig.build.mounts.solids import bar, camera_solids, lens_front
 from rig.build.mounts.structure import Joint, Member, Solid, Structure
 from rig.build.mounts.surroundings import Surroundings
 from rig.build.mounts.systems.base import Built
+from rig.build.mounts.systems.corners import leg_mm, unplaced, with_corners
 from rig.build.mounts.systems.hanging import Rail, hang_all, spread_order
 from rig.build.mounts.systems.heads import HeadKind
 from rig.build.mounts.systems.outrigger import Hung, Outrigger, X, Y, Z
-from rig.build.mounts.systems.stays import stayed
+from rig.build.mounts.systems.stays import Stays, stayed
 from rig.catalogue.items import Profile
 
 BEHIND_MM = 90.0
@@ -41,7 +42,9 @@ LOOSE_BAYS = (
     "or weigh them down behind."
 )
 NARROWEST_MM = 500.0
-END_MM = 20.0
+END_MM = 6.0
+"""Between the bracket beside the last upright of a bay and that of its foot."""
+
 SIDE_DEG = 60.0
 """Cameras more to the side than this get a bay of their own: an arm along the subject's view
 would have to be longer than the camera is far."""
@@ -240,23 +243,27 @@ class TSlotHolding:
         """See :class:`rig.build.mounts.systems.base.Holding`."""
         uprights = [_upright_member(u) for u in self.uprights]
         bases = [m for bay in self.bays for m in self._base(bay)]
-        stays, stay_joints = self._stays(uprights)
-        bases += stays
+        stays = self._stays(uprights)
+        bases += stays.members
         members = [*uprights, *bases, *(m for h in self.hung for m in h.members())]
         solids = [_upright_solid(m) for m in (*uprights, *bases)]
         solids += [s for h in self.hung for s in (*h.solids(), *camera_solids(h.mount.camera))]
-        joints = [j for bay in self.bays for j in self._base_joints(bay)] + stay_joints
+        solids += stays.solids
+        joints = [*(j for bay in self.bays for j in self._base_joints(bay)), *stays.joints]
         half = self.system.outrigger.profile.height_mm / 2.0
         joints += [j for h in self.hung for j in h.joints(h.mount.values()["height"] + half)]
         touching = [p for h in self.hung for p in h.touching()]
-        touching += [(j.on, j.other) for j in joints]
-        structure = Structure(
-            tuple(members), (), (), tuple(p for h in self.hung for p in h.placed()),
-            tuple(joints), tuple(solids),
-        )  # fmt: skip
+        touching += [(j.on, j.other) for j in joints] + stays.touching()
+        parts = (*(p for h in self.hung for p in h.placed()), *stays.parts)
+        structure = Structure(tuple(members), (), (), parts, tuple(joints), tuple(solids))
         mounts = tuple(self._measured(h) for h in self.hung)
+        structure, joined = with_corners(
+            structure, pairs(*touching), self.system.outrigger.corner,
+            tuple(m.camera for m in mounts), self.around,
+        )  # fmt: skip
         notes = (LOOSE_BAYS,) if len(self.bays) > 1 else ()
-        return Built(structure, mounts, pairs(*touching), notes)
+        notes += unplaced(structure, self.system.outrigger.corner)
+        return Built(structure, mounts, joined, notes)
 
     def _measured(self, hung: Hung) -> CameraMount:
         upright = next(u for u in self.uprights if u.id == hung.rail)
@@ -275,8 +282,9 @@ class TSlotHolding:
 
     def _ends(self, bay: Bay) -> tuple[float, float]:
         places = [u.across_mm for u in self.uprights if u.bay == bay.index]
-        half = self.system.outrigger.profile.width_mm / 2.0
-        low, high = min(places) - half - END_MM, max(places) + half + END_MM
+        parts = self.system.outrigger
+        beyond = parts.profile.width_mm / 2.0 + 2.0 * leg_mm(parts.corner)[0] + END_MM
+        low, high = min(places) - beyond, max(places) + beyond
         more = max(0.0, NARROWEST_MM - (high - low)) / 2.0
         return float(np.floor(low - more)), float(np.ceil(high + more))
 
@@ -310,17 +318,15 @@ class TSlotHolding:
         ]
         return rails + feet
 
-    def _stays(self, uprights: list[Member]) -> tuple[list[Member], list[Joint]]:
+    def _stays(self, uprights: list[Member]) -> Stays:
         """A sill and stays behind each bay, where the frame has them."""
-        members: list[Member] = []
-        joints: list[Joint] = []
+        made = Stays()
         for bay in self.bays if self.system.stays else ():
             mine = {u.id for u in self.uprights if u.bay == bay.index}
             standing = [m for m in uprights if m.id in mine]
             feet, parts = self._base(bay)[2:], self.system.outrigger.stay_parts
-            more, held = stayed(str(bay.index + 1), standing, feet, parts)
-            members, joints = members + more, joints + held
-        return members, joints
+            made += stayed(str(bay.index + 1), standing, feet, parts)
+        return made
 
     def _base_joints(self, bay: Bay) -> list[Joint]:
         bottom, top, left, right = self._base(bay)
