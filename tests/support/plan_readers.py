@@ -164,9 +164,12 @@ def dxf_geometry(document: Drawing) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Optical centre from the datum and optical axis of each camera, measured in the views.
 
     The three views are told apart by the crosses at the datum: top is above front, side right
-    of it. X and Z come from the front view, Y from the top view; Z again from the side.
+    of it. X and Z come from the front view, Y from the top view; Z again from the side. Seen from
+    the subject's side, which the front's title says, X and Y count the other way.
     """
     space = document.modelspace()
+    before = any("from the subject's side" in line for line in dxf_lines(document))
+    sign = np.array([-1.0, -1.0, 1.0] if before else [1.0, 1.0, 1.0])
     crosses = [
         np.array(e.get_points("xy")).mean(axis=0) for e in space.query('LWPOLYLINE[layer=="DATUM"]')
     ]
@@ -190,7 +193,7 @@ def dxf_geometry(document: Drawing) -> dict[str, tuple[np.ndarray, np.ndarray]]:
             (x, z), y = views[0][end] - front, (views[1][end] - top)[1]
             assert np.allclose(views[2][end] - side, [y, z], atol=1e-6), "the views agree"
             assert np.isclose((views[1][end] - top)[0], x, atol=1e-6)
-            points.append(np.array([x, y, z]))
+            points.append(sign * np.array([x, y, z]))
         axis = points[1] - points[0]
         out[name] = points[0], axis / np.linalg.norm(axis)
     return out

@@ -9,6 +9,7 @@ import numpy as np
 from common.errors import InputError
 from geometry.arrays import Floats
 from rig.build.drawings.frame import A3_LANDSCAPE_MM, BLOCK_MM, MARGIN_MM
+from rig.build.mounts.structure import Structure
 
 DENOMINATORS = (1, 2, 2.5, 5, 7.5, 10, 12.5, 15, 20, 25, 30, 40, 50, 75, 100, 150, 200, 500, 1000)
 EDGE_MM = 24.0
@@ -34,6 +35,18 @@ class SheetView:
 FRONT = SheetView("Front: from behind the cameras", (1, 0, 0), (0, 0, 1))
 TOP = SheetView("Top", (1, 0, 0), (0, 1, 0))
 SIDE = SheetView("Right side", (0, 1, 0), (0, 0, 1))
+BEHIND = (FRONT, TOP, SIDE)
+BEFORE = (
+    SheetView("Front: from the subject's side", (-1, 0, 0), (0, 0, 1)),
+    SheetView("Top", (-1, 0, 0), (0, -1, 0)),
+    SheetView("Right side", (0, -1, 0), (0, 0, 1)),
+)
+"""A plate would hide what is on it from behind, and is drilled and set from this side."""
+
+
+def views_of(structure: Structure) -> tuple[SheetView, SheetView, SheetView]:
+    """Front, top and right side of a mount, its front the side that whoever sets it sees."""
+    return BEFORE if structure.plates else BEHIND
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,8 +73,13 @@ class PlacedView:
         return np.asarray((self.high_mm - self.low_mm) / self.denominator)
 
 
-def arranged(low: Floats, high: Floats) -> tuple[PlacedView, PlacedView, PlacedView]:
-    """Front, top above it and side right of it, at the largest scale that fits."""
+def arranged(
+    low: Floats, high: Floats, views: tuple[SheetView, SheetView, SheetView] = BEHIND
+) -> tuple[PlacedView, PlacedView, PlacedView]:
+    """Front, top above it and side right of it, at the largest scale that fits.
+
+    ``low``, ``high`` (3,): corners of what is drawn, in the rig frame.
+    """
     width, depth, height = high - low
     across = A3_LANDSCAPE_MM[0] - 2.0 * MARGIN_MM - 2.0 * EDGE_MM - BETWEEN_MM
     upwards = A3_LANDSCAPE_MM[1] - 2.0 * MARGIN_MM - BLOCK_MM[1] - 2.0 * EDGE_MM - BETWEEN_MM - 6.0
@@ -80,7 +98,12 @@ def arranged(low: Floats, high: Floats) -> tuple[PlacedView, PlacedView, PlacedV
         (left + width / n + BETWEEN_MM, base),
     )
     front, top, side = (
-        PlacedView(view, view.axes[:2] @ low, view.axes[:2] @ high, np.array(origin), float(n))
-        for view, origin in zip((FRONT, TOP, SIDE), origins, strict=True)
+        PlacedView(view, *_ends(view, low, high), np.array(origin), float(n))
+        for view, origin in zip(views, origins, strict=True)
     )
     return front, top, side
+
+
+def _ends(view: SheetView, low: Floats, high: Floats) -> tuple[Floats, Floats]:
+    ends = np.stack([low, high]) @ view.axes[:2].T
+    return ends.min(axis=0), ends.max(axis=0)

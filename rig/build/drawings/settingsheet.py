@@ -12,7 +12,7 @@ from rig.build.drawings.chainrows import CHAIN_COLUMNS, CHAIN_WORDS, chain_rows
 from rig.build.drawings.figures import POSE_COLUMNS, fixed, mm, pose_figures, setting_text
 from rig.build.drawings.frame import A4_MM, BLOCK_MM, MARGIN_MM, Content, fitted, framed
 from rig.build.drawings.items import Item, Line, Sheet, Text
-from rig.build.drawings.layout import FRONT, TOP, PlacedView, SheetView
+from rig.build.drawings.layout import PlacedView, SheetView, views_of
 from rig.build.drawings.tables import Table, table_items
 from rig.build.drawings.views import plan_solids
 from rig.build.mounts.plan import Give, MountPlan, Tolerance
@@ -31,7 +31,7 @@ PICTURE_MM = (WIDE_MM / 2.0 - 4.0, 58.0)
 
 def setting_sheets(plan: MountPlan) -> tuple[Sheet, ...]:
     """The setting sheets of all cameras, A4, in the plan's order."""
-    maps = {view.title: _map(plan, view) for view in (FRONT, TOP)}
+    maps = {view.title: _map(plan, view) for view in views_of(plan.structure)[:2]}
     contents = [_content(plan, mount, maps) for mount in plan.mounts]
     return framed(plan.name, contents)
 

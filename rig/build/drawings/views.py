@@ -12,7 +12,7 @@ from rig.build.drawings.figures import POSE_COLUMNS, mm, pose_figures
 from rig.build.drawings.frame import A3_LANDSCAPE_MM, MARGIN_MM, Content, framed
 from rig.build.drawings.hidden import visible_lines
 from rig.build.drawings.items import CameraMark, Dimension, Item, Line, Sheet, Text
-from rig.build.drawings.layout import EDGE_MM, PlacedView, arranged
+from rig.build.drawings.layout import EDGE_MM, PlacedView, arranged, views_of
 from rig.build.drawings.tables import Table, table_items, table_sheets
 from rig.build.mounts.plan import MountPlan
 from rig.build.mounts.structure import Member, Solid
@@ -62,7 +62,8 @@ def view_sheets(plan: MountPlan, subject_mm: Floats | None = None) -> tuple[Shee
     points += [m.camera.pose.position_rig_mm[None] for m in plan.mounts]
     points += [] if subject_mm is None else [subject_mm]
     everything = np.concatenate(points)
-    views = arranged(everything.min(axis=0), everything.max(axis=0))
+    sides = views_of(plan.structure)
+    views = arranged(everything.min(axis=0), everything.max(axis=0), sides)
     items: list[Item] = []
     named = _named(views, plan)
     for view in views:
@@ -196,11 +197,11 @@ def _row(
 
 
 def _ordinates(view: PlacedView, plan: MountPlan, points: Floats, axis: int) -> list[Ordinate]:
-    """Coordinates of points (N, 3) along one axis of a view, from the datum."""
+    """Coordinates of points (N, 3) along one axis of a view, from the datum, as the rig counts."""
     if not len(points):
         return []
     places = view.paper(points)[:, axis]
-    figures = (points - plan.datum_rig_mm) @ view.view.axes[axis]
+    figures = (points - plan.datum_rig_mm) @ np.abs(view.view.axes[axis])
     return [Ordinate(float(p), mm(float(f))) for p, f in zip(places, figures, strict=True)]
 
 

@@ -298,9 +298,9 @@ class ArcHolding:
             facet, place = self._hinge(rib)
             ways = (-forward, facet.at(0.0)[:3, 1])
             made.append(pivot_part(of[f"{rib.id} a"], pivot, place, pin, ways))
-            for strut, end in self._struts(rib):
-                joint, place = of[f"{strut.id} b"], self._strut_end(end)
-                made.append(pivot_part(joint, pivot, place, pin, (-forward, end.at(0.0)[:3, 1])))
+            for strut, far in self._struts(rib):
+                joint, place = of[f"{strut.id} b"], self._strut_end(far)
+                made.append(pivot_part(joint, pivot, place, pin, (-forward, far.at(0.0)[:3, 1])))
         for member, ribs in zip(bars, pairwise(self._row()), strict=True):
             for end, (mark, rib) in enumerate(zip("ab", ribs, strict=True)):
                 _, normal, pin_mm = self._bar_pin(rib, ribs[1 - end])

@@ -58,7 +58,7 @@ class _Box:
     def slots(self, axis: int) -> Floats:
         """Middles of the slots across ``axis`` (0 or 1), from the middle of the member."""
         count = max(1, round(2.0 * float(self.half[axis]) / self.module))
-        return self.module * (np.arange(count) - (count - 1) / 2.0)
+        return np.asarray(self.module * (np.arange(count, dtype=np.float64) - (count - 1) / 2.0))
 
 
 def corner_places(one: Member, other: Member, bracket: Bracket) -> tuple[Floats, ...]:

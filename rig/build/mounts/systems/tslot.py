@@ -261,7 +261,7 @@ class TSlotHolding:
             structure, pairs(*touching), self.system.outrigger.corner,
             tuple(m.camera for m in mounts), self.around,
         )  # fmt: skip
-        notes = (LOOSE_BAYS,) if len(self.bays) > 1 else ()
+        notes: tuple[str, ...] = (LOOSE_BAYS,) if len(self.bays) > 1 else ()
         notes += unplaced(structure, self.system.outrigger.corner)
         return Built(structure, mounts, joined, notes)
 
