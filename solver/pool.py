@@ -3,13 +3,8 @@
 from __future__ import annotations
 
 import multiprocessing as mp
-import os
-import threading
-from collections.abc import Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from contextlib import contextmanager
 from dataclasses import dataclass
-from multiprocessing.process import BaseProcess
 from multiprocessing.queues import Queue
 from multiprocessing.synchronize import Event
 from typing import Protocol
@@ -17,8 +12,8 @@ from typing import Protocol
 from threadpoolctl import threadpool_limits
 
 from common.errors import CancelledError
+from common.processes import end_with_parent, single_threaded_children
 from common.progress import CancelToken
-from common.threads import ONE_BLAS_THREAD
 from solver.near_optimum import run_near
 from solver.outer_loop import Report, StartResult, run_start
 from solver.problem import Problem
@@ -40,21 +35,6 @@ class StartJob:
     near: bool = False
 
 
-@contextmanager
-def _single_threaded_children() -> Iterator[None]:
-    """BLAS reads its thread count when it is loaded, so children must be born with it set."""
-    before = {name: os.environ.get(name) for name in ONE_BLAS_THREAD}
-    os.environ.update(ONE_BLAS_THREAD)
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                os.environ.pop(name, None)
-            else:
-                os.environ[name] = value
-
-
 Step = tuple[int, int, int, float, float]
 
 _channel: tuple[Queue[Step], Event] | None = None
@@ -64,14 +44,7 @@ def _begin(messages: Queue[Step], cancelled: Event) -> None:
     """Set up a worker: its channel, and its end when its parent dies."""
     global _channel  # a pool's initializer has no other way to hand things over
     _channel = (messages, cancelled)
-    parent = mp.parent_process()
-    if parent is not None:
-        threading.Thread(target=_die_with, args=(parent,), daemon=True).start()
-
-
-def _die_with(parent: BaseProcess) -> None:
-    parent.join()
-    os._exit(1)
+    end_with_parent()
 
 
 def solve(job: StartJob, report: Report, cancel: CancelToken) -> StartResult:
@@ -114,7 +87,7 @@ def run_all(
     context = mp.get_context("spawn")
     messages: Queue[Step] = context.Queue()
     cancelled = context.Event()
-    with _single_threaded_children():
+    with single_threaded_children():
         pool = ProcessPoolExecutor(min(workers, len(jobs)), context, _begin, (messages, cancelled))
         try:
             futures = [pool.submit(_solve_in_worker, job) for job in jobs]

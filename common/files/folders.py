@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import shutil
 import tempfile
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from common.errors import ConflictError, InputError
-from common.files.ownership import foreign, mark
+from common.files.lock import LockHeldError, lock_folder
+from common.files.ownership import MARKER, files_of, foreign, mark
 
 _ANOTHER = "give another --out, or move it away yourself"
 
@@ -37,7 +38,7 @@ def new_folder(
                 "give another --out, or --force to replace results that are in it",
             )
         _refuse_foreign(out, out, renewed)
-    made = [parent for parent in out.parents if not parent.exists()]
+    made = _missing_parents(out)
     partial = _beside(out)
     try:
         (partial / "files").mkdir()
@@ -47,9 +48,7 @@ def new_folder(
     finally:
         shutil.rmtree(partial, ignore_errors=True)
         if not out.exists():
-            for parent in made:
-                with suppress(OSError):
-                    parent.rmdir()
+            _remove_empty(made)
 
 
 @contextmanager
@@ -74,6 +73,85 @@ def whole_folder(out: Path) -> Iterator[Path]:
         ) from error
     finally:
         shutil.rmtree(partial, ignore_errors=True)
+
+
+@contextmanager
+def grown_folder(
+    out: Path, kept: str, *, force: bool, spare: Iterable[Path] = (), same: Callable[[], bool]
+) -> Iterator[Path]:
+    """An empty folder whose files join ``out`` when all went well, and disappear when not.
+
+    What is in ``out/kept`` stays, whatever happens, and may grow meanwhile; the rest of ``out`` is
+    replaced. Its results are replaced without ``force`` where ``same`` says that they are of the
+    same work, or where there are none yet. Raises as :func:`new_folder` does, and where another
+    process is at work in ``out``.
+    """
+    _refuse_place(out)
+    _refuse_loss(out, spare)
+    held, made = _holds_something(out), _missing_parents(out)
+    if held:
+        _refuse_other_work(out, kept, force=force, same=same)
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        if not (out / MARKER).exists():
+            mark(out)
+        lock = lock_folder(out)
+    except LockHeldError as error:
+        remedy = "wait until it has ended, or give another --out"
+        raise ConflictError("out-busy", f"another process works in {out}", remedy) from error
+    except OSError as error:
+        problem = f"cannot write into {out} ({(error.strerror or 'unwritable').lower()})"
+        raise InputError("out-unwritable", problem, "give another --out") from error
+    partial = _beside(out)
+    try:
+        (partial / "files").mkdir()
+        yield partial / "files"
+        # Looked at again: it was in plain view for long.
+        _refuse_foreign(out, out, _all_in(out / kept))
+        _clear(out, kept)
+        for path in sorted((partial / "files").iterdir()):
+            path.replace(out / path.name)
+        mark(out)
+    finally:
+        lock.release()
+        shutil.rmtree(partial, ignore_errors=True)
+        if not held and not files_of(out):
+            shutil.rmtree(out, ignore_errors=True)
+            _remove_empty(made)
+
+
+def _refuse_other_work(out: Path, kept: str, *, force: bool, same: Callable[[], bool]) -> None:
+    """Refuse a folder that is not ours, or holds results of another work."""
+    begun = (out / MARKER).is_file() and (not files_of(out) or (out / kept).is_dir())
+    if not force and not (begun and same()):
+        raise ConflictError(
+            "out-not-empty",
+            f"the folder {out} is not empty",
+            "give another --out, or --force to replace results that are in it",
+        )
+    _refuse_foreign(out, out, _all_in(out / kept))
+
+
+def _all_in(folder: Path) -> list[Path]:
+    """A folder and all that is below it; nothing where there is none."""
+    return [folder, *folder.rglob("*")] if folder.is_dir() else []
+
+
+def _clear(out: Path, kept: str) -> None:
+    """Remove all files and folders of ``out`` but ``kept``."""
+    for path in sorted(out.rglob("*"), reverse=True):
+        if path.relative_to(out).parts[0] != kept and path.name != MARKER:
+            path.rmdir() if path.is_dir() else path.unlink()
+
+
+def _missing_parents(out: Path) -> list[Path]:
+    return [parent for parent in out.parents if not parent.exists()]
+
+
+def _remove_empty(folders: Iterable[Path]) -> None:
+    for folder in folders:
+        with suppress(OSError):
+            folder.rmdir()
 
 
 def refuse_others(out: Path, own: Collection[str]) -> None:

@@ -37,7 +37,8 @@ def mark(folder: Path) -> None:
 def foreign(folder: Path, but: Collection[Path] = ()) -> str | None:
     """Why ``folder`` must not be removed, as the end of a sentence; None where all in it is ours.
 
-    Files to leave out of account, ``but``, may have been changed since they were written.
+    Files to leave out of account, ``but``, may have been changed since they were written; so may
+    folders, which are ours with nothing in them too.
     """
     if os.path.ismount(folder):
         return "is a place where a disk is mounted"
@@ -86,7 +87,7 @@ def _why_foreign(
     if stat.S_ISLNK(mode):
         return "is a link"
     if stat.S_ISDIR(mode):
-        ours = any(known.startswith(f"{name}/") for known in listed)
+        ours = any(known.startswith(f"{name}/") for known in listed) or path.resolve() in exempt
         return None if ours and not os.path.ismount(path) else "is not ours"
     if not stat.S_ISREG(mode):
         return "is no plain file"

@@ -33,6 +33,7 @@ from service.cli.commands.rig import rig
 from service.cli.commands.scan import scan
 from service.cli.commands.serve import serve
 from service.cli.commands.sessions import sessions
+from service.cli.commands.study import study
 from service.cli.commands.targets import targets
 from service.cli.commands.trial import trial
 from service.cli.commands.trigger import trigger
@@ -69,7 +70,7 @@ def _options(
 
 
 for command in (
-    *(demo, scan, design, evaluate, plan, catalogue, export),
+    *(demo, scan, design, evaluate, study, plan, catalogue, export),
     *(targets, calibrate, check, accept),
     *(reconstruct, compare, trial),
     *(practice, capture, cameras, fake_trigger, serve, backup, restore),

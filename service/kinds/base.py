@@ -53,7 +53,7 @@ class RunContext(Model):
     ``workers``: processes that may be used. ``scan_name``: what the scan is called in reports.
     ``made_utc``: when it was asked for, ISO 8601. ``reference``: what a calibration is called.
     ``session`` and its ``captures`` (all without any), or the folder ``pictures``: where pictures
-    are that come as no input file.
+    are that come as no input file. ``cache``: a folder where finished parts are found and kept.
     """
 
     workers: int = 1
@@ -63,6 +63,7 @@ class RunContext(Model):
     session: str | None = None
     captures: list[str] = Field(default_factory=list)
     pictures: str | None = None
+    cache: str | None = None
 
 
 RequestT = TypeVar("RequestT", bound=Request)

@@ -1,9 +1,9 @@
 """JSON schemas and key tables of the files, generated from the models that read them.
 
 ``python -m service.reference.schemas FOLDER`` writes the schemas of rig files, design files,
-stations, sessions, captures, catalogues, mounts and plans to FOLDER (``docs/reference``) and renews
-the tables between the marks in ``rig-file.md``, ``design-file.md``, ``station-file.md``,
-``catalogue.md`` and ``mounts.md``.
+stations, sessions, captures, catalogues, mounts, plans and studies to FOLDER (``docs/reference``)
+and renews the tables between the marks in ``rig-file.md``, ``design-file.md``, ``station-file.md``,
+``catalogue.md``, ``mounts.md`` and ``study-file.md``.
 """
 
 from __future__ import annotations
@@ -27,6 +27,8 @@ from rig.build.mounts.systemfile import SystemFile
 from rig.catalogue.model import CatalogueFile
 from rig.design.designmodel import DesignFile
 from rig.specification.rigfile import RigFile
+from rig.study.resultfile import StudyResultFile
+from rig.study.studyfile import StudyFile
 
 BEGIN, END = "<!-- keys -->", "<!-- end of keys -->"
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
@@ -105,7 +107,7 @@ def documents(folder: Path) -> dict[Path, str]:
     """What each generated file in the folder ``folder`` should hold."""
     rig_file, design_file = folder / "rig-file.md", folder / "design-file.md"
     station_file, parts_file = folder / "station-file.md", folder / "catalogue.md"
-    mounts = folder / "mounts.md"
+    mounts, study_file = folder / "mounts.md", folder / "study-file.md"
     return {
         folder / "rig.schema.json": schema_text(RigFile, "Rigwright rig file"),
         folder / "design.schema.json": schema_text(DesignFile, "Rigwright design file"),
@@ -115,6 +117,9 @@ def documents(folder: Path) -> dict[Path, str]:
         folder / "catalogue.schema.json": schema_text(CatalogueFile, "Rigwright catalogue file"),
         folder / "mount.schema.json": schema_text(SystemFile, "Rigwright mount file"),
         folder / "plan.schema.json": schema_text(PlanFile, "Rigwright mount plan"),
+        folder / "study.schema.json": schema_text(StudyFile, "Rigwright study file"),
+        folder / "study-result.schema.json": schema_text(StudyResultFile, "Rigwright study result"),
+        study_file: with_key_table(study_file.read_text(encoding="utf-8"), StudyFile),
         station_file: with_key_table(station_file.read_text(encoding="utf-8"), StationFile),
         rig_file: with_key_table(rig_file.read_text(encoding="utf-8"), RigFile),
         design_file: with_key_table(design_file.read_text(encoding="utf-8"), DesignFile),

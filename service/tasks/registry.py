@@ -111,6 +111,13 @@ def _recognition_verification() -> Work[Any, Any]:
     return Work(VERIFICATION, verification)
 
 
+def _study() -> Work[Any, Any]:
+    from service.kinds.study import STUDY
+    from service.tasks.studying import study
+
+    return Work(STUDY, study)
+
+
 def _scan_import() -> Work[Any, Any]:
     from service.kinds.imports import SCAN_IMPORT
     from service.tasks.reading import import_scan
@@ -140,6 +147,7 @@ _WORK: dict[str, Callable[[], Work[Any, Any]]] = {
     "recognition-training": _recognition_training,
     "recognition-enrolment": _recognition_enrolment,
     "recognition-verification": _recognition_verification,
+    "study": _study,
     "scan-import": _scan_import,
     "picture-import": _pictures_import,
 }

@@ -6,13 +6,14 @@ import os
 import shutil
 import socket
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
 from common.errors import ConflictError, InputError
-from common.files.folders import new_folder
+from common.files.folders import grown_folder, new_folder
 from common.files.ownership import MARKER, files_of, mark
 from service.cli import app
 
@@ -263,6 +264,7 @@ COMMANDS = {
     "reconstruct": ("reconstruct", "pictures", "--calibration", "cal.json"),
     "compare": ("compare", "head.xyz", "--truth", "head.xyz"),
     "trial": ("trial", "design.json", "--head", "head.xyz"),
+    "study": ("study", "study.toml"),
     "practice": ("practice",),
     "demo": ("demo",),
 }
@@ -274,7 +276,15 @@ def command(
 ) -> tuple[str, ...]:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "pictures").mkdir()
-    for name in ("head.xyz", "rig.toml", "design.json", "mount.toml", "set.toml", "cal.json"):
+    for name in (
+        "head.xyz",
+        "rig.toml",
+        "design.json",
+        "mount.toml",
+        "set.toml",
+        "cal.json",
+        "study.toml",
+    ):
         (tmp_path / name).write_text("x")
     given: tuple[str, ...] = request.param
     return given
@@ -308,3 +318,60 @@ def test_the_list_names_every_file(tmp_path: Path) -> None:
     mark(tmp_path)
     text = (tmp_path / MARKER).read_text()
     assert '"a.txt"' in text and '"b/c.txt"' in text and MARKER not in files_of(tmp_path)
+
+
+def grown(out: Path, *, force: bool = False, same: bool = True) -> AbstractContextManager[Path]:
+    return grown_folder(out, "units", force=force, same=lambda: same)
+
+
+def test_a_folder_grows_and_keeps_what_was_finished_before_it_failed(tmp_path: Path) -> None:
+    out = tmp_path / "new" / "out"
+    with pytest.raises(ZeroDivisionError), grown(out):
+        put(out, units__one_json="1")
+        raise ZeroDivisionError
+    assert list(files_of(out)) == ["units/one.json"]
+    with grown(out) as folder:
+        put(out, units__two_json="2")
+        put(folder, study_json="{}", parts__a_txt="a")
+    assert list(files_of(out)) == ["parts/a.txt", "study.json", "units/one.json", "units/two.json"]
+    with grown(out) as folder:
+        put(folder, study_json="{ }")
+    assert list(files_of(out)) == ["study.json", "units/one.json", "units/two.json"]
+    with new_folder(out, force=True) as folder:  # all of it is ours
+        put(folder, other_json="{}")
+    assert list(files_of(out)) == ["other.json"]
+
+
+def test_a_grown_folder_that_failed_before_anything_was_finished_is_gone(tmp_path: Path) -> None:
+    with pytest.raises(ZeroDivisionError), grown(tmp_path / "new" / "out"):
+        raise ZeroDivisionError
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_with_another_work_s_results_does_not_grow_by_itself(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    with grown(out) as folder:
+        put(folder, study_json="{}")
+        put(out, units__one_json="1")
+    with pytest.raises(ConflictError, match="--force"), grown(out, same=False):
+        raise AssertionError
+    with grown(out, same=False, force=True) as folder:
+        put(folder, study_json="{}")
+    assert list(files_of(out)) == ["study.json", "units/one.json"]
+
+
+def test_a_folder_that_another_process_grows_is_let_be(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    with grown(out) as folder:
+        put(folder, study_json="{}")
+        with pytest.raises(ConflictError, match="another process works"), grown(out):
+            raise AssertionError
+    assert list(files_of(out)) == ["study.json"]
+
+
+def test_what_somebody_lays_into_a_growing_folder_is_not_removed(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    with pytest.raises(ConflictError, match=r"note\.txt"), grown(out) as folder:
+        put(folder, study_json="{}")
+        put(out, note_txt="mine")
+    assert list(files_of(out)) == ["note.txt"]

@@ -1,0 +1,1 @@
+"""Studies: many rigs designed over a grid of choices, and what they say together."""
