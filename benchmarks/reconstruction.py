@@ -13,10 +13,10 @@ from pathlib import Path
 
 import numpy as np
 
-from evaluation.comparison.comparing import Within, compare
 from evaluation.comparison.distances import Reference
 from evaluation.reconstruction.reconstructing import reconstruct
 from evaluation.reconstruction.views import View, view_of
+from evaluation.trial.trying import judged
 from rig.design.designfile import read_design
 from rig.simulation.settings import HeadSettings, SceneSettings
 from rig.simulation.studio import Shot, Studio
@@ -45,9 +45,8 @@ def main() -> None:
     if surface is None:
         raise SystemExit("the scene has no head")
     truth = Reference(surface.vertices_mm, surface.faces)
-    nose = surface.vertices_mm[np.argmin(surface.vertices_mm[:, 1])]
-    region = Within((float(nose[0]), float(nose[1]), float(nose[2])), RADIUS_MM)
-    found = compare(done.cloud.points_mm, truth, within=region).figures
+    trial = judged(done, truth, cameras, RADIUS_MM)
+    found = trial.comparison.figures
     print("| figure | value |\n| --- | --- |")
     print(f"| points | {found.points:,} |")
     print(f"| bias | {found.bias_mm:+.4f} mm |")
@@ -57,6 +56,9 @@ def main() -> None:
         print(f"| {share:g} % within | {value:.3f} mm |")
     for reach, value in found.reached_percent:
         print(f"| surface within {reach:g} mm of a point | {value:.1f} % |")
+    print(f"| of the surface seen by two cameras | {trial.seen_percent:.1f} % |")
+    for part in trial.regions:
+        print(f"| predicted to measured scatter, {part.name} | {part.ratio:.2f} |")
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     print(f"| pictures to points | {wall:.0f} s, {busy:.0f} s of processor time |")
     print(f"| peak memory, photographing included | {peak:.0f} MiB |")

@@ -15,8 +15,7 @@ from evaluation.reconstruction.views import Singles, View
 from evaluation.reconstruction.volume import Volume
 from geometry.arrays import Bools, Floats
 
-COARSE_STRIDE = 2
-"""Patches of the half-size pictures start at every second pixel, so at every fourth of the full."""
+STEEPEST_DEG = 70.0
 
 
 @dataclass(frozen=True)
@@ -166,6 +165,48 @@ def grown_start(map_: DepthMap, steps: int) -> tuple[Floats, Floats]:
     )
     near = ~known & (distance <= steps)
     return np.where(near, value, np.nan), slope
+
+
+_BEND_CELLS = 3.0
+"""Curvature is taken over so many grid cells: less is noisier than what it mends (measured)."""
+
+
+def bent(map_: DepthMap, half_width_px: int) -> DepthMap:
+    """The map with its patches' curvature taken out, which a plane cannot follow.
+
+    A plane fitted over ``-h..h`` pixels to a surface whose inverse depth bends by ``c`` and ``e``
+    per pixel squared lies off its middle by ``(c + e) / 2`` times the mean of ``i^2``, which is
+    ``h (h + 1) / 3``. The bends are the change of the slopes from patch to patch.
+    """
+    known = np.isfinite(map_.inverse_depth_per_mm)
+    weight = np.maximum(ndimage.gaussian_filter(known.astype(np.float64), _BEND_CELLS), 1e-9)
+    bend = np.zeros(known.shape)
+    for number, axis in ((0, 1), (1, 0)):
+        slope = np.where(known, map_.slopes[..., number], 0.0)
+        smooth = ndimage.gaussian_filter(slope, _BEND_CELLS) / weight
+        bend += np.gradient(smooth, map_.stride_px, axis=axis)
+    # At a rim the slopes of nothing would speak too.
+    inner = ndimage.minimum_filter(known, 3)
+    off = bend * half_width_px * (half_width_px + 1) / 6.0
+    rho = map_.inverse_depth_per_mm - np.where(inner, off, 0.0)
+    return replace(map_, inverse_depth_per_mm=rho)
+
+
+def facing(map_: DepthMap) -> Bools:
+    """Which patches (h, w) their camera sees at less than 70 degrees from the normal.
+
+    More slanted ones reach over three times as much of the surface as others, which is no plane.
+    """
+    view = map_.reference
+    rows, columns = np.indices(map_.inverse_depth_per_mm.shape) * float(map_.stride_px)
+    rho, slope = map_.inverse_depth_per_mm, map_.slopes
+    flat = rho - slope[..., 0] * columns - slope[..., 1] * rows
+    plane = np.stack([slope[..., 0], slope[..., 1], flat], axis=-1) @ view.matrix
+    rays = np.stack([columns, rows, np.ones_like(rows)], axis=-1) @ np.linalg.inv(view.matrix).T
+    least = np.cos(np.radians(STEEPEST_DEG))
+    length = np.linalg.norm(plane, axis=-1) * np.linalg.norm(rays, axis=-1)
+    with np.errstate(invalid="ignore"):
+        return np.asarray(rho >= least * length)
 
 
 def merged(map_: DepthMap, more: DepthMap) -> DepthMap:

@@ -27,7 +27,9 @@ from evaluation.reconstruction.cloud import Cloud
 from evaluation.reconstruction.depthmaps import (
     DepthMap,
     Matching,
+    bent,
     coarse_start,
+    facing,
     first_slopes,
     grown_start,
     masked,
@@ -36,7 +38,7 @@ from evaluation.reconstruction.depthmaps import (
     steady,
     upsampled,
 )
-from evaluation.reconstruction.fusion import FusedPoints, best_references, fused
+from evaluation.reconstruction.fusion import FusedPoints, best_references, boldness, fused
 from evaluation.reconstruction.neighbours import on_surface
 from evaluation.reconstruction.pairs import companions, partners, ray_angles_deg
 from evaluation.reconstruction.views import View, memory_told
@@ -240,8 +242,9 @@ def _full_map(
         return refined_none(view, shape, stride), 0
     start, slopes = upsampled(half, best, shape, stride)
     found = refined(view, others, start, slopes, stride, options.full)
-    keep = steady(found, 2.0, network.scale_px_mm(k, network.full))
-    return masked(found, keep), int(np.isfinite(start).sum())
+    keep = steady(found, 2.0, network.scale_px_mm(k, network.full)) & facing(found)
+    found = bent(masked(found, keep), options.full.half_width_samples)
+    return found, int(np.isfinite(start).sum())
 
 
 def _inside(points: FusedPoints, volume: Volume) -> FusedPoints:
@@ -266,6 +269,8 @@ def _result(
         )
     normals = np.concatenate([p.normals for p in parts])
     sigma = np.concatenate([p.sigma_mm for p in parts])
+    # What the normal equations cannot know shows in how far the cameras' surfaces lie apart.
+    sigma *= boldness(points, np.concatenate([p.apart for p in parts]))
     owner = np.repeat(np.arange(len(parts)), [len(p.points_mm) for p in parts])
     keep = on_surface(points, normals, sigma, options.stray_mm, options.workers)
     colours = np.concatenate(

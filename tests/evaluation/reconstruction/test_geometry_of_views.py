@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import cv2
 import matching_scenes as scenes
 import numpy as np
 import pytest
 
 from common.errors import InputError
-from evaluation.reconstruction.depthmaps import DepthMap, relations
-from evaluation.reconstruction.fusion import measured_points
+from evaluation.reconstruction.depthmaps import DepthMap, bent, relations
+from evaluation.reconstruction.fusion import SHARED, boldness, fused, measured_points
 from evaluation.reconstruction.neighbours import on_surface
 from evaluation.reconstruction.pairs import companions, partners, ray_angles_deg
 from evaluation.reconstruction.views import View, memory_told
@@ -108,3 +110,65 @@ def test_too_little_memory_is_told_as_such_by_opencv_too() -> None:
         cv2.resize(np.zeros((4, 4), np.uint8), (1 << 30, 1 << 30))
     with pytest.raises(cv2.error), memory_told():
         cv2.resize(np.zeros((4, 4), np.uint8), (0, 0))
+
+
+def seen_edgewise() -> DepthMap:
+    """A camera 88 degrees from the plane's normal whose patches lean 18 degrees towards it."""
+    normal = scenes.TILTED / np.linalg.norm(scenes.TILTED)
+    along = np.cross(normal, [0.0, 0.0, 1.0])
+    turn = np.radians(88.0)
+    place = 420.0 * (np.cos(turn) * normal + np.sin(turn) * along / np.linalg.norm(along))
+    map_ = exact_map(scenes.plane_view("edge", scenes.looking_at_origin(place.tolist())), 1)
+    known = map_.inverse_depth_per_mm > 0.0
+    return replace(
+        map_,
+        inverse_depth_per_mm=np.where(known, map_.inverse_depth_per_mm, np.nan),
+        slopes=map_.slopes * np.tan(np.radians(70.0)) / np.tan(turn),
+        variance=np.full(known.shape, 1e-12),
+    )
+
+
+def test_a_camera_that_sees_a_surface_edgewise_does_not_pull_it() -> None:
+    front = [exact_map(view) for view in scenes.plane_views()[:2]]
+    front = [replace(m, variance=np.full(m.variance.shape, 1e-14)) for m in front]
+    points = fused([*front, seen_edgewise()], 0).points_mm
+    off = np.abs(points @ scenes.TILTED / np.linalg.norm(scenes.TILTED))
+    assert len(points) > 100
+    # Half a pixel of 0.47 mm is read off the leaning patches: 0.23 mm. Along their own normals they
+    # have 0.1 / rho^2 um = 0.18 mm times cos 70 deg, 3.4 times the others' sigma: of three weights
+    # theirs is 1 / 24, and a tenth of the points lie nearer or farther than that. By the cosine of
+    # the point's own normal, 88 deg, they would have 0.006 mm and pull by 0.15 mm.
+    assert np.percentile(off, 75.0) < 0.23 / 24.0
+    assert off.max() < 0.23 / 4.0
+
+
+def test_curvature_is_taken_out_of_a_map() -> None:
+    view = scenes.plane_views()[0]
+    flat = exact_map(view)
+    rows, columns = np.indices(flat.inverse_depth_per_mm.shape) * float(flat.stride_px)
+    bend = np.array([2e-9, -5e-10])
+    middle = np.array([columns.mean(), rows.mean()])
+    true = flat.inverse_depth_per_mm + 0.5 * (
+        bend[0] * (columns - middle[0]) ** 2 + bend[1] * (rows - middle[1]) ** 2
+    )
+    slopes = flat.slopes + np.stack(
+        [bend[0] * (columns - middle[0]), bend[1] * (rows - middle[1])], -1
+    )
+    # The mean of i^2 over -4..4 is 20 / 3: what a plane through such a patch lies off.
+    fitted = replace(flat, inverse_depth_per_mm=true + bend.sum() * 10.0 / 3.0, slopes=slopes)
+    off = bent(fitted, 4).inverse_depth_per_mm - true
+    inner = (slice(14, -14), slice(14, -14))
+    # Gaussian weights reach 4 x 3 cells: beyond, a quadric's slopes are linear and kept exactly.
+    assert np.abs(off[inner]).max() < 1e-3 * bend.sum() * 10.0 / 3.0
+
+
+def test_sigmas_grow_where_cameras_disagree_more_than_they_should() -> None:
+    rng = np.random.default_rng(3)
+    points = rng.uniform(0.0, 30.0, (6000, 3)) * [1.0, 0.4, 0.4]
+    apart = rng.normal(0.0, np.sqrt(1.0 - SHARED), len(points))
+    apart[points[:, 0] >= 15.0] *= 3.0
+    factor = boldness(points, apart)
+    # A robust spread of 3,000 is known to 1.17 / sqrt(6,000) = 1.5 %; three times that.
+    assert factor[points[:, 0] >= 15.5] == pytest.approx(3.0, rel=0.05)
+    assert factor[points[:, 0] < 14.5] == pytest.approx(1.0, abs=0.05)
+    assert np.array_equal(boldness(points[:50], apart[:50]), np.ones(50))
