@@ -107,7 +107,12 @@ class PlanResult(Result):
 
     name: str
     system: str
-    buildable: Annotated[bool, Field(description="Whether nothing clashes.")]
+    buildable: Annotated[
+        bool,
+        Field(
+            description="Whether nothing clashes and no camera leans beyond what the design allows."
+        ),
+    ]
     clashes: list[PlanClash]
     price: PlanPrice
     yield_share: Annotated[

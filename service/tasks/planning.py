@@ -69,16 +69,16 @@ def plan(task: Task[PlanRequest, PlanResult], running: Running) -> PlanResult:
     )
     writing = within(running.report, _WRITING, 1.0)
     write_plan(made, task.folder, options, progress=writing, cancel=running.cancel)
-    return _result(made)
+    return in_short(made)
 
 
-def _result(made: MountPlan) -> PlanResult:
+def in_short(made: MountPlan) -> PlanResult:
     """A plan in short."""
     structure = made.structure
     return PlanResult(
         name=made.name,
         system=made.system,
-        buildable=not made.clashes,
+        buildable=made.buildable,
         clashes=[_clash(clash) for clash in made.clashes],
         price=_price(made.price),
         yield_share=made.yield_share,

@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
-import pytest
+from dataclasses import replace
 
+import numpy as np
+import pytest
+from plans import tslot_plan
+
+from rig.build.mounts.plan import Clash, Give, Sag
 from service.cli.commands.plan import caution, why_not
 from service.kinds.plan import PlanClash, PlanNetwork, PlanPrice, PlanResult
+from service.tasks.planning import in_short
 
 ROWS = ["coverage/2", "clearance/cam01/cam02", "focus/cam03", "frame/cam04"]
 
@@ -72,3 +78,15 @@ def test_limits_lost_by_rounding_are_a_caution() -> None:
     made = result(designed=network(), built=network(ROWS[0]))
     assert not why_not(made)
     assert "(coverage/2)" in caution(made)
+
+
+@pytest.mark.parametrize(("off_deg", "sound"), [(0.4, True), (0.6, False)])
+def test_a_rig_that_leans_too_far_is_not_buildable(off_deg: float, sound: bool) -> None:
+    """It was called buildable as long as nothing clashed."""
+    give = Give("tilt", "deg", off_deg, 0.5, 1.0)
+    sag = Sag("c1", np.zeros(3), off_deg, 0.1, 0.1, (give,))
+    made = replace(tslot_plan(2), clashes=(), sags=(sag,))
+    short = in_short(made)
+    assert short.buildable == sound and bool(short.sags[0].too_far) != sound
+    hit = Clash("solid", "a", "b", -1.0, 2.0)
+    assert not in_short(replace(made, clashes=(hit,))).buildable

@@ -1,5 +1,6 @@
 """Drawings of a mount plan: views, plates, templates and setting sheets, as DXF, SVG and PDF."""
 
+from rig.build.drawings.checksheet import check_sheets, checks_csv
 from rig.build.drawings.dxf import dxf_bytes
 from rig.build.drawings.isometric import isometric_sheets
 from rig.build.drawings.items import Sheet
@@ -13,6 +14,8 @@ from rig.build.drawings.templates import template_pages, template_sheet
 from rig.build.drawings.views import view_sheets
 
 __all__ = [
+    "check_sheets",
+    "checks_csv",
     "isometric_sheets",
     "Sheet",
     "dxf_bytes",

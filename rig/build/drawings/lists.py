@@ -38,7 +38,8 @@ POSE_FIELDS = (
 )
 
 
-def _csv(fields: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+def csv_text(fields: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Rows under their fields."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(fields)
@@ -66,7 +67,7 @@ def settings_csv(plan: MountPlan) -> str:
             sag = ("", "") if give is None else (f"{give.off:.3f}", f"{_more(give):g}")
             figures = (setting_text(s), s.unit, *span, *off, s.measured_from, *sag)
             rows.append((mount.name, s.name, *figures))
-    return _csv(SETTING_FIELDS, rows)
+    return csv_text(SETTING_FIELDS, rows)
 
 
 def _more(give: Give) -> float:
@@ -80,9 +81,9 @@ def tapes_csv(plan: MountPlan) -> str:
         for mount in plan.mounts
         for tape in mount.tapes
     )
-    return _csv(TAPE_FIELDS, rows)
+    return csv_text(TAPE_FIELDS, rows)
 
 
 def poses_csv(plan: MountPlan) -> str:
     """A line per camera: optical centre from the datum, and how it looks."""
-    return _csv(POSE_FIELDS, (pose_figures(m.camera, plan.datum_rig_mm) for m in plan.mounts))
+    return csv_text(POSE_FIELDS, (pose_figures(m.camera, plan.datum_rig_mm) for m in plan.mounts))

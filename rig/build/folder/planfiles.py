@@ -159,6 +159,7 @@ def _lists(making: _Making) -> Iterable[PlanFile]:
         "parts/joints.json": ("where joints are marked", lambda: parts.joints_json(plan)),
         "settings/settings.csv": ("all settings", lambda: drawings.settings_csv(plan)),
         "settings/tapes.csv": ("all tape measures", lambda: drawings.tapes_csv(plan)),
+        "settings/checks.csv": ("what shows on each camera", lambda: drawings.checks_csv(plan)),
         "settings/poses.csv": ("poses from the datum", lambda: drawings.poses_csv(plan)),
     }
     for name, (words, make) in makers.items():
@@ -220,6 +221,8 @@ def _setting_sheets(making: _Making) -> Iterable[PlanFile]:
         "the setting sheets of all cameras",
         lambda: drawings.pdf_bytes(making.settings, plan.name),
     )
+    words = "what inclinometer, picture and tape show on each camera"
+    yield from _sheets("settings/checks", words, plan.name, lambda: drawings.check_sheets(plan))
     for index, stem in enumerate(_stems([mount.name for mount in plan.mounts])):
         words = f"setting sheet of {plan.mounts[index].name}"
         one = _picked(making, index)

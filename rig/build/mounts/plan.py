@@ -169,6 +169,11 @@ class MountPlan:
     sags: tuple[Sag, ...] = ()
 
     @property
+    def buildable(self) -> bool:
+        """Whether nothing clashes and no camera leans too far."""
+        return not self.clashes and not self.leaning
+
+    @property
     def leaning(self) -> tuple[Sag, ...]:
         """Cameras that give way more than a limit of the design allows, the worst first."""
         over = [sag for sag in self.sags if sag.worst.share > 1.0]
