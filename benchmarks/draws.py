@@ -9,7 +9,7 @@ import numpy as np
 from synthetic_scenes import Scene, face_scene
 
 from calibration.adjustment import Calibration, CalibrationOptions, calibrate
-from calibration.adjustment.camera import PER_CAMERA, CalibratedCamera
+from calibration.adjustment.camera import INTERIOR, PER_CAMERA, CalibratedCamera
 from calibration.adjustment.forward import intersected
 from calibration.adjustment.rotations import vector_of
 from calibration.adjustment.state import camera_arrays
@@ -55,7 +55,7 @@ class Draws:
     def centre_ratio(self) -> float:
         """Root mean square error of all camera centres over their Cramer-Rao bound."""
         place = np.zeros(len(self.free), bool).reshape(-1, PER_CAMERA)
-        place[:, 9:12] = True
+        place[:, INTERIOR : INTERIOR + 3] = True
         own = place.ravel()[self.free]
         bound = float(np.trace(self.predicted[np.ix_(own, own)]))
         return float(np.sqrt(np.mean(np.sum(self.error[:, own] ** 2, axis=1)) / bound))

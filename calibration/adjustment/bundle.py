@@ -14,6 +14,7 @@ from calibration.adjustment.crossvalidation import cross_validate
 from calibration.adjustment.finite import finite_rows
 from calibration.adjustment.initialisation.finding import find_start
 from calibration.adjustment.inspection import inspect
+from calibration.adjustment.lensfit import judged_lenses, told_of_lens
 from calibration.adjustment.levenberg import Solution, Stop, adjust
 from calibration.adjustment.network import Network
 from calibration.adjustment.noise import NoiseModel
@@ -82,7 +83,11 @@ def calibrate(
     inspect(observations)
     progress(Progress("start", 0.0))
     with repeats_are_told(observations):
-        return _calibrated(observations, options, progress, cancel)
+        try:
+            done = _calibrated(observations, options, progress, cancel)
+        except InputError as error:
+            raise told_of_lens(error, observations, options, _calibrated, cancel) from error
+        return judged_lenses(done, observations, options, _calibrated, cancel)
 
 
 def _calibrated(

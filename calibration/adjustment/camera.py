@@ -12,9 +12,15 @@ from geometry.arrays import Floats, frozen
 from geometry.camera import (
     INTERIOR_NAMES,
     NO_DISTORTION,
+    STRETCH,
+    TERM_COUNTS,
+    LensModel,
     RigCamera,
     distort,
     interior_vector,
+    lens_terms,
+    model_of,
+    own_terms,
     perspective,
     undistort,
 )
@@ -32,8 +38,9 @@ class Interior:
     """Interior orientation. Pixel centres at integers.
 
     ``x_px = f (1 + b1) x + cx``, ``y_px = f y + cy`` of normalised coordinates distorted after
-    Brown-Conrady with ``distortion`` (5,) k1, k2, p1, p2, k3. ``affinity`` b1 is how much wider
-    than tall the pixels image; square pixels have 0.
+    Brown-Conrady with ``distortion`` (5,) k1, k2, p1, p2, k3, or as a rational (8,) or fisheye
+    lens (4,) after :mod:`geometry.camera.distortion`. ``affinity`` b1 is how much wider than tall
+    the pixels image; square pixels have 0.
     """
 
     focal_length_px: float
@@ -50,26 +57,33 @@ class Interior:
                 "an interior orientation has a value that cannot be",
                 "give a positive focal_length_px and finite values",
             )
-        if centre.shape != (2,) or terms.shape != (5,):
+        if centre.shape != (2,) or terms.ndim != 1 or len(terms) not in TERM_COUNTS:
             raise InputError(
                 "interior",
                 "an interior orientation has the wrong number of values",
-                "give principal_point_px [x, y] and distortion [k1, k2, p1, p2, k3]",
+                "give principal_point_px [x, y] and distortion [k1, k2, p1, p2, k3], with k4, "
+                "k5, k6 for a rational lens, or [k1, k2, k3, k4] for a fisheye",
             )
         object.__setattr__(self, "principal_point_px", centre)
         object.__setattr__(self, "distortion", terms)
 
     @property
+    def lens_model(self) -> LensModel:
+        """By which equations the lens bends."""
+        return model_of(self.distortion)
+
+    @property
     def vector(self) -> Floats:
-        """The parameters (9,) in the order of :data:`INTERIOR_NAMES`."""
+        """The parameters (13,) in the order of :data:`INTERIOR_NAMES`."""
         return interior_vector(
             self.focal_length_px, self.principal_point_px, self.distortion, self.affinity
         )
 
     @classmethod
     def of(cls, vector: Floats) -> Self:
-        """From the parameters (9,) in the order of :data:`INTERIOR_NAMES`."""
-        return cls(float(vector[0]), vector[1:3], vector[3:8], float(vector[8]))
+        """From the parameters (13,) in the order of :data:`INTERIOR_NAMES`."""
+        terms = own_terms(lens_terms(vector))
+        return cls(float(vector[0]), vector[1:3], terms, float(vector[STRETCH]))
 
     @property
     def camera_matrix(self) -> Floats:

@@ -15,7 +15,7 @@ from geometry.arrays import Floats, Ints, frozen, frozen_ints
 class Covariance:
     """Covariance of cameras, placed carriers and targets; mm, px and radians.
 
-    ``core`` (r, r): the cameras (15 each), the carriers (6 each), the kept targets (3 each).
+    ``core`` (r, r): the cameras (19 each), the carriers (6 each), the kept targets (3 each).
     An eliminated target is ``effect`` (3 e, r) times the core plus a part of its own with
     covariance ``own`` (e, 3, 3). ``kept`` (k,) and ``eliminated`` (e,) are target indices.
     Held unknowns have zeros.
@@ -57,12 +57,12 @@ class Covariance:
 
     @property
     def cameras(self) -> Floats:
-        """Of all camera parameters, (15 n, 15 n)."""
+        """Of all camera parameters, (19 n, 19 n)."""
         size = PER_CAMERA * self.camera_count
         return self.core[:size, :size]
 
     def camera(self, index: int) -> Floats:
-        """Of one camera's parameters, (15, 15)."""
+        """Of one camera's parameters, (19, 19)."""
         place = slice(PER_CAMERA * index, PER_CAMERA * (index + 1))
         return self.core[place, place]
 
@@ -87,7 +87,7 @@ class Covariance:
         return np.asarray((rows @ self.core) @ np.swapaxes(rows, 1, 2) + self.own_blocks())
 
     def joint(self) -> Floats:
-        """Of all cameras and then all targets in their order, (15 n + 3 m, 15 n + 3 m)."""
+        """Of all cameras and then all targets in their order, (19 n + 3 m, 19 n + 3 m)."""
         size = PER_CAMERA * self.camera_count
         rows = np.concatenate([np.eye(size, len(self.core)), self.target_rows()])
         out = rows @ self.core @ rows.T
@@ -98,7 +98,7 @@ class Covariance:
         return np.asarray(out)
 
     def of_functions(self, by_cameras: Floats, by_targets: Floats) -> Floats:
-        """Of functions with partials (q, 15 n) by cameras and (q, m, 3) by targets, (q, q)."""
+        """Of functions with partials (q, 19 n) by cameras and (q, m, 3) by targets, (q, q)."""
         size = PER_CAMERA * self.camera_count
         rows = by_targets.reshape(len(by_targets), 3 * self.target_count) @ self.target_rows()
         rows[:, :size] += by_cameras

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from calibration.adjustment.build import some_rows
+from calibration.adjustment.camera import INTERIOR
 from calibration.adjustment.levenberg import LossOptions, adjust
 from calibration.adjustment.network import Network
 from calibration.adjustment.reduction import SingularError
@@ -70,17 +71,17 @@ def _alone(network: Network) -> Network:
 
 
 def _solved(network: Network, state: State, loss: LossOptions) -> tuple[Floats, Floats] | None:
-    """Camera parameters (15 n,) and their covariance."""
+    """Camera parameters (19 n,) and their covariance."""
     try:
         solution = adjust(network, state, replace(loss, damping=NEAR_DAMPING))
         covariance = solution.reduction.covariance().cameras
     except SingularError:
         return None
     moved = np.zeros((network.camera_count, covariance.shape[0] // network.camera_count))
-    moved[:, :9] = solution.state.interior - state.interior
-    moved[:, 9:12] = solution.state.centre - state.centre
+    moved[:, :INTERIOR] = solution.state.interior - state.interior
+    moved[:, INTERIOR : INTERIOR + 3] = solution.state.centre - state.centre
     rotation = solution.state.rotation @ np.swapaxes(state.rotation, 1, 2)
-    moved[:, 12:] = 0.5 * np.stack(
+    moved[:, INTERIOR + 3 :] = 0.5 * np.stack(
         [
             rotation[:, 2, 1] - rotation[:, 1, 2],
             rotation[:, 0, 2] - rotation[:, 2, 0],

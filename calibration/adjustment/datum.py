@@ -18,7 +18,7 @@ from geometry.arrays import Floats
 
 
 def shift_space(state: State, scaled: bool) -> Floats:
-    """How all camera parameters (15 n, 6 or 7) change as the rig shifts, turns (and grows)."""
+    """How all camera parameters (19 n, 6 or 7) change as the rig shifts, turns (and grows)."""
     count = len(state.centre)
     arm = state.centre - state.centre.mean(axis=0)
     out = np.zeros((count, PER_CAMERA, 6 + scaled))

@@ -21,7 +21,7 @@ STILL_MM = 1e-9
 class Points:
     """``position_rig_mm`` (p, 3), NaN where fewer than two cameras saw a point.
 
-    ``covariance_mm2`` (p, 3, 3) from image noise; ``by_cameras`` (p, 3, 15 n): how points move
+    ``covariance_mm2`` (p, 3, 3) from image noise; ``by_cameras`` (p, 3, 19 n): how points move
     when the cameras that were used are not the true ones; ``rays`` (p,).
     """
 

@@ -26,7 +26,7 @@ class ObservationIndex:
 class Partials:
     """Computed pixels (n, 2), depths (n,) and partials of the pixels.
 
-    ``camera`` (n, 2, 15) by interior and exterior orientation, ``pose`` (n, 2, 6) by translation
+    ``camera`` (n, 2, 19) by interior and exterior orientation, ``pose`` (n, 2, 6) by translation
     and rotation of the carrier in the rig frame, ``target`` (n, 2, 3) in the carrier's frame.
     """
 

@@ -16,7 +16,7 @@ from geometry.arrays import Bools, Floats, Ints
 class Priors:
     """Observed values of unknowns with their sigmas: 0 holds fast, infinity says nothing.
 
-    ``interior`` and ``interior_sigma`` (n, 9); ``centre`` (n, 3), ``rotation`` (n, 3, 3) and
+    ``interior`` and ``interior_sigma`` (n, 13); ``centre`` (n, 3), ``rotation`` (n, 3, 3) and
     ``exterior_sigma`` (n, 6) in mm and radians; ``target`` and ``target_sigma`` (m, 3).
     """
 
@@ -85,7 +85,7 @@ class Network:
 
     @cached_property
     def camera_free(self) -> Bools:
-        """Which of its parameters each camera may change, (n, 15)."""
+        """Which of its parameters each camera may change, (n, 19)."""
         p = self.priors
         return np.concatenate([p.interior_sigma > 0.0, p.exterior_sigma > 0.0], axis=1)
 

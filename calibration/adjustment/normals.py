@@ -33,7 +33,7 @@ class Normals:
 class Residuals:
     """Observed less computed values, and ``depth`` (n,) of the image points in mm.
 
-    ``pixel`` (n, 2); ``interior`` (n, 9), ``exterior`` (n, 6), ``target`` (m, 3) of the priors;
+    ``pixel`` (n, 2); ``interior`` (n, 13), ``exterior`` (n, 6), ``target`` (m, 3) of the priors;
     ``length_mm`` (d,) of the measured distances.
     """
 

@@ -11,7 +11,7 @@ from calibration.adjustment.camera import CalibratedCamera, Interior
 from calibration.adjustment.levenberg import LossOptions
 from common.errors import InputError
 from geometry.arrays import Floats
-from geometry.camera import INTERIOR_NAMES
+from geometry.camera import INTERIOR_NAMES, TERM_NAMES, LensModel
 
 FREE = float("inf")
 FIXED = 0.0
@@ -25,6 +25,13 @@ RADIAL_SHARE = (0.3, 0.3, 0.1)
 """What k1, k2, k3 may each do at the corner of the image, as a share of its radius."""
 
 TANGENTIAL_SHARE = 0.01
+
+RATIONAL_SHARE = (1.0, 0.3, 0.1, 1.0, 0.3, 0.1)
+"""The same for k1 to k6 of a rational lens. What one does others all but undo: the last are kept
+small, so that of all ways to say the same the adjustment finds one."""
+
+SHAPE_NAMES = ("f", "cx", "cy", "b1")
+"""Interior parameters that lenses of all models have."""
 
 NARROW = 0.35
 """Lenses whose corners are nearer to the axis than this (tangent; 19 degrees) need no k3: it could
@@ -49,9 +56,12 @@ class InteriorModel:
     p2: float | None = None
     k3: float | None = None
     b1: float = FIXED
+    k4: float | None = None
+    k5: float | None = None
+    k6: float | None = None
 
     def __post_init__(self) -> None:
-        given = [v for v in (getattr(self, name) for name in INTERIOR_NAMES) if v is not None]
+        given = [v for v in (getattr(self, n) for n in INTERIOR_NAMES[:-1]) if v is not None]
         if any(np.isnan(v) or v < 0.0 for v in given):
             raise InputError(
                 "calibration-model",
@@ -60,20 +70,29 @@ class InteriorModel:
             )
 
     def sigmas(self, interior: Interior, size_px: tuple[int, int]) -> Floats:
-        """Sigmas (9,) for a camera that starts with ``interior``."""
+        """Sigmas (13,) for a camera that starts with ``interior``; terms it lacks are held."""
         radius = float(np.hypot(*size_px) / 2.0 / interior.focal_length_px)
         middle = max(CENTRE_PX, CENTRE_SHARE * size_px[0])
-        usual = {
-            "cx": middle,
-            "cy": middle,
-            "k1": RADIAL_SHARE[0] / radius**2,
-            "k2": RADIAL_SHARE[1] / radius**4,
-            "k3": RADIAL_SHARE[2] / radius**6 if radius > NARROW else FIXED,
-            "p1": TANGENTIAL_SHARE / radius,
-            "p2": TANGENTIAL_SHARE / radius,
-        }
-        given = {name: getattr(self, name) for name in INTERIOR_NAMES}
+        usual = {"cx": middle, "cy": middle} | _usual_terms(interior.lens_model, radius)
+        known = {*SHAPE_NAMES, *TERM_NAMES[interior.lens_model]}
+        given = {n: getattr(self, n) if n in known else FIXED for n in INTERIOR_NAMES}
         return np.array([usual[n] if given[n] is None else given[n] for n in INTERIOR_NAMES])
+
+
+def _usual_terms(lens: LensModel, radius: float) -> dict[str, float]:
+    """Sigmas of distortion terms where the corner is ``radius`` focal lengths from the axis."""
+    tangential = {"p1": TANGENTIAL_SHARE / radius, "p2": TANGENTIAL_SHARE / radius}
+    first, second, third = RADIAL_SHARE
+    if lens is LensModel.RATIONAL:
+        names = TERM_NAMES[lens][:2] + TERM_NAMES[lens][4:]
+        powers = (2, 4, 6, 2, 4, 6)
+        return tangential | {
+            n: share / radius**p for n, share, p in zip(names, RATIONAL_SHARE, powers, strict=True)
+        }
+    terms = {"k1": first / radius**2, "k2": second / radius**4, "k3": third / radius**6}
+    if lens is LensModel.FISHEYE:
+        return terms | {"k4": third / radius**8}
+    return tangential | terms | ({} if radius > NARROW else {"k3": FIXED})
 
 
 @dataclass(frozen=True)
@@ -98,7 +117,8 @@ class CalibrationOptions:
 
     ``interiors`` gives interior orientations alone, where poses are not known at all. ``model``
     serves all cameras but those named in ``models``. ``reference_poses`` makes the start's poses
-    observations and so the datum; without it the network is free. ``rescale``: whether the stated
+    observations and so the datum; without it the network is free. ``lens``: the model of all
+    lenses; None takes the start's, and Brown-Conrady from nothing. ``rescale``: whether the stated
     sigmas of image points may be corrected by what the residuals show. ``reject``: whether image
     points that fail Baarda's test are left out.
     """
@@ -112,6 +132,7 @@ class CalibrationOptions:
     rescale: bool = True
     reject: bool = True
     cross_validate: bool = True
+    lens: LensModel | None = None
 
     def __post_init__(self) -> None:
         if self.reference_poses is not None and not self.start:

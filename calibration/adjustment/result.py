@@ -119,7 +119,8 @@ class CalibrationQuality:
     ``rejected`` image points failed their test, those of ``late_views`` among them; ``dropped``
     ones could not be used from the start. ``chi2`` over ``dof`` with the sigmas in use (after any
     correction); ``components`` factors of stated sigmas by group. ``scale`` says where the size
-    comes from. ``warnings``: one sentence each, the most important first.
+    comes from. ``warnings``: one sentence each, the most important first. ``unfit_lenses``: cameras
+    whose lenses another model describes better; do not use the result.
     """
 
     converged: bool
@@ -138,6 +139,7 @@ class CalibrationQuality:
     cross_validation: CrossValidation | None
     scale: str
     warnings: tuple[str, ...]
+    unfit_lenses: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

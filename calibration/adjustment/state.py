@@ -16,7 +16,7 @@ from geometry.frames import Pose
 class State:
     """Cameras, places of carriers, targets.
 
-    ``interior`` (n, 9); ``centre`` (n, 3) mm and ``rotation`` (n, 3, 3) rig to camera;
+    ``interior`` (n, 13); ``centre`` (n, 3) mm and ``rotation`` (n, 3, 3) rig to camera;
     ``position`` (k, 3) and ``attitude`` (k, 3, 3) of carriers: ``X_rig = attitude x + position``;
     ``target`` (m, 3) in the frame of its carrier.
     """
@@ -29,7 +29,7 @@ class State:
     target: Floats
 
     def moved(self, core: Floats, target: Floats) -> State:
-        """After a step: ``core`` (15 n + 6 k,) of cameras and carriers, ``target`` (m, 3)."""
+        """After a step: ``core`` (19 n + 6 k,) of cameras and carriers, ``target`` (m, 3)."""
         count = len(self.interior)
         cameras = core[: PER_CAMERA * count].reshape(count, PER_CAMERA)
         carriers = core[PER_CAMERA * count :].reshape(len(self.position), 6)
@@ -64,7 +64,7 @@ class State:
 
 
 def camera_arrays(cameras: tuple[CalibratedCamera, ...]) -> tuple[Floats, Floats, Floats]:
-    """``interior`` (n, 9), ``centre`` (n, 3), ``rotation`` (n, 3, 3) of cameras."""
+    """``interior`` (n, 13), ``centre`` (n, 3), ``rotation`` (n, 3, 3) of cameras."""
     return (
         np.stack([c.interior.vector for c in cameras]),
         np.stack([c.pose.position_rig_mm for c in cameras]),

@@ -21,9 +21,9 @@ MICROMETRE = 1e3
 
 @dataclass(frozen=True, eq=False)
 class Effects:
-    """Mean squares at what each camera sees: ``change^T form change`` of its 15 parameters.
+    """Mean squares at what each camera sees: ``change^T form change`` of its 19 parameters.
 
-    ``px`` (n, 15, 15) of its image points; ``mm`` (n, 15, 15) of the points in space that are
+    ``px`` (n, 19, 19) of its image points; ``mm`` (n, 19, 19) of the points in space that are
     intersected with the old calibration although this camera has changed. ``gsd_mm``: how much
     of the subject one pixel is, over all cameras. ``rotation`` (n, 3, 3) rig to camera.
     """
@@ -58,7 +58,7 @@ def effects(epoch: Epoch, state: State) -> Effects:
 
 
 def _point_shifts(epoch: Epoch, by_point: Floats, by_camera: Floats) -> Floats:
-    """How intersected points move with their camera's parameters, (n, 3, 15); mm per unit."""
+    """How intersected points move with their camera's parameters, (n, 3, 19); mm per unit."""
     _, point = np.unique(epoch.points, return_inverse=True)
     point = point.reshape(-1)
     blocks = np.swapaxes(by_point, 1, 2) @ by_point

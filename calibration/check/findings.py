@@ -70,7 +70,7 @@ def changes(diagnosis: Diagnosis) -> tuple[Change, ...]:
 
 
 def camera_change(one: Change) -> Floats:
-    """A change of a camera or its lens as one of all its parameters (15,)."""
+    """A change of a camera or its lens as one of all its parameters (19,)."""
     out = np.zeros(PER_CAMERA)
     first = INTERIOR if one.cause.cause is Cause.POSE else 0
     out[first : first + len(one.change)] = one.change
@@ -87,7 +87,7 @@ def joint_effect_mm(diagnosis: Diagnosis, subject: Subject) -> float:
 
 
 def _by_camera(one: Change) -> dict[int, Floats]:
-    """A change's share in each camera's parameters (15,); empty for those of targets."""
+    """A change's share in each camera's parameters (19,); empty for those of targets."""
     if one.cause.cause in (Cause.POSE, Cause.LENS):
         return {one.cause.subject: camera_change(one)}
     if one.cause.cause is not Cause.ALL_FOCAL:

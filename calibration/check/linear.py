@@ -1,6 +1,6 @@
 """The linear model of a check: normal equations of all that could have changed.
 
-Columns ("base"): all cameras (15 each), the used targets (3 each), and each view's own shift and
+Columns ("base"): all cameras (19 each), the used targets (3 each), and each view's own shift and
 turn of its carrier (6 each). Unknowns: errors of the reference (unit normal numbers, mapped by a
 root of its covariance), the places of carriers, and whatever an accepted finding set free.
 """

@@ -19,8 +19,8 @@ RANK = 1e-13
 class Reference:
     """Values and uncertainty of a calibration.
 
-    ``interior`` (n, 9), ``centre`` (n, 3), ``rotation`` (n, 3, 3), ``target`` (m, 3) of the
-    used targets; ``root`` (15 n + 3 m, r) with ``root root^T`` their covariance.
+    ``interior`` (n, 13), ``centre`` (n, 3), ``rotation`` (n, 3, 3), ``target`` (m, 3) of the
+    used targets; ``root`` (19 n + 3 m, r) with ``root root^T`` their covariance.
     """
 
     interior: Floats

@@ -17,6 +17,7 @@ from calibration.adjustment.model import ObservationIndex, partials
 from calibration.adjustment.state import State
 from calibration.check.epoch import Epoch
 from geometry.arrays import Bools, Floats, Ints
+from geometry.camera import project as image_of
 
 RADIUS_MM = 90.0
 """Half the width of a head with its ears, less half its curvature at the nose."""
@@ -31,12 +32,12 @@ WEAKEST = 8.0
 
 @dataclass(frozen=True, eq=False)
 class Subject:
-    """How points of a face (p,) move with the cameras' parameters: ``by_camera`` (p, 3, 15 n)."""
+    """How points of a face (p,) move with the cameras' parameters: ``by_camera`` (p, 3, 19 n)."""
 
     by_camera: Floats
 
     def effect_mm(self, changes: Mapping[int, Floats]) -> float:
-        """Largest shift of a point when all ``changes`` (15,) by camera index happened at once."""
+        """Largest shift of a point when all ``changes`` (19,) by camera index happened at once."""
         change = np.zeros(self.by_camera.shape[2])
         for camera, own in changes.items():
             change[PER_CAMERA * camera : PER_CAMERA * (camera + 1)] += own
@@ -73,8 +74,7 @@ def _visible(epoch: Epoch, state: State, points: Floats, normals: Floats) -> Boo
     away = np.linalg.norm(to_camera, axis=2)
     facing = np.einsum("pci,pi->pc", to_camera, normals) > np.cos(np.radians(WIDEST_DEG)) * away
     local = np.einsum("cij,pcj->pci", state.rotation, -to_camera)
-    safe = np.maximum(local[..., 2:], 1e-6)
-    pixels = state.interior[:, 0, None] * local[..., :2] / safe + state.interior[:, 1:3]
+    pixels, _ = image_of(local, state.interior)
     size = np.array(epoch.image_size_px)
     inside = ((pixels > 0.0) & (pixels < size)).all(axis=2) & (local[..., 2] > 0.0)
     return np.asarray(facing & inside & used)

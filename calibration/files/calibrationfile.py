@@ -27,7 +27,9 @@ SCHEMA = "rigwright.calibration/1"
 
 Pair = Annotated[list[float], Len(2, 2)]
 Vector = Annotated[list[float], Len(3, 3)]
-Terms = Annotated[list[float], Len(5, 5)]
+Terms = Annotated[list[float], Len(4, 8)]
+"""Four of a fisheye, five after Brown-Conrady, eight of a rational lens."""
+
 Matrix = Annotated[list[Vector], Len(3, 3)]
 Size = Annotated[list[int], Len(2, 2)]
 Sparse = Annotated[list[float | None], Len(3, 3)]

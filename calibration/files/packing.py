@@ -8,7 +8,7 @@ import zlib
 
 import numpy as np
 
-from calibration.adjustment.camera import PER_CAMERA
+from calibration.adjustment.camera import INTERIOR, PER_CAMERA
 from calibration.adjustment.covariance import Covariance
 from common.errors import InputError
 from common.files.strict import StrictModel
@@ -16,12 +16,18 @@ from geometry.arrays import Floats
 
 LARGEST_ROWS = 20_000
 
+FIRST_COUNT = 15
+"""Parameters of a camera in files of before there were rational and fisheye lenses."""
+
+FIRST_INTERIOR = 9
+
 
 class PackedCovariance(StrictModel):
     """A covariance: counts, target indices, and packed arrays.
 
     ``core`` is the lower triangle of a symmetric matrix, row by row; ``effect`` and ``own`` are
-    as in :class:`Covariance`. Packed: little-endian doubles, deflated, base64.
+    as in :class:`Covariance`. Packed: little-endian doubles, deflated, base64. ``per_camera`` is
+    the number of each camera's parameters: :data:`FIRST_COUNT` where a file does not tell.
     """
 
     camera_count: int
@@ -31,6 +37,7 @@ class PackedCovariance(StrictModel):
     core: str
     effect: str
     own: str
+    per_camera: int = FIRST_COUNT
 
 
 def pack(values: Floats) -> str:
@@ -102,17 +109,19 @@ def packed(covariance: Covariance) -> dict[str, object]:
         "core": pack(core[np.tril_indices(len(core))]),
         "effect": pack(covariance.effect),
         "own": pack(covariance.own),
+        "per_camera": PER_CAMERA,
     }
 
 
 def unpacked(model: PackedCovariance, cameras: int, targets: int, source: str) -> Covariance:
     """The covariance of a file with so many cameras and targets."""
     kept, eliminated = np.array(model.kept, np.int64), np.array(model.eliminated, np.int64)
-    rank = PER_CAMERA * cameras + 6 * model.pose_count + 3 * len(kept)
+    rank = model.per_camera * cameras + 6 * model.pose_count + 3 * len(kept)
     listed = np.sort(np.concatenate([kept, eliminated]))
     if (
         model.camera_count != cameras
         or model.pose_count < 0
+        or model.per_camera not in (FIRST_COUNT, PER_CAMERA)
         or rank > LARGEST_ROWS
         or not np.array_equal(listed, np.arange(targets))
     ):
@@ -125,6 +134,9 @@ def unpacked(model: PackedCovariance, cameras: int, targets: int, source: str) -
     core[np.tril_indices(rank)] = unpack(model.core, rank * (rank + 1) // 2, source)
     core = core + np.tril(core, -1).T
     effect = unpack(model.effect, 3 * len(eliminated) * rank, source)
+    effect = effect.reshape(3 * len(eliminated), rank)
+    if model.per_camera == FIRST_COUNT:
+        core, effect = _widened(core, effect, cameras)
     own = unpack(model.own, 9 * len(eliminated), source)
     return Covariance(
         cameras,
@@ -132,6 +144,17 @@ def unpacked(model: PackedCovariance, cameras: int, targets: int, source: str) -
         kept,
         eliminated,
         core,
-        effect.reshape(3 * len(eliminated), rank),
+        effect,
         own.reshape(-1, 3, 3),
     )
+
+
+def _widened(core: Floats, effect: Floats, cameras: int) -> tuple[Floats, Floats]:
+    """Core (r, r) and effect (e, r) with the parameters that cameras had not at first."""
+    own = np.r_[0:FIRST_INTERIOR, INTERIOR:PER_CAMERA]
+    first = (PER_CAMERA * np.arange(cameras)[:, None] + own).ravel()
+    rest = np.arange(len(core) - len(first)) + PER_CAMERA * cameras
+    places, size = np.concatenate([first, rest]), PER_CAMERA * cameras + len(rest)
+    wide, wide_effect = np.zeros((size, size)), np.zeros((len(effect), size))
+    wide[np.ix_(places, places)], wide_effect[:, places] = core, effect
+    return wide, wide_effect

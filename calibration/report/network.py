@@ -11,6 +11,7 @@ from calibration.adjustment.result import Calibration
 from common.page.html import esc, text_table
 from common.page.svg import FAINT, GREEN, INK, dot, drawing, line, words
 from geometry.arrays import Floats
+from geometry.camera import TERM_NAMES
 
 _WIDTH, _MARGIN = 480.0, 40.0
 _SIGHT_SHARE = 0.2
@@ -24,20 +25,8 @@ VIEWS = (("from above", (0, 1)), ("from the front", (0, 2)))
 
 def values_table(calibration: Calibration) -> str:
     """Focal length, principal point, distortion and place of each camera."""
-    head = (
-        "camera",
-        "f px",
-        "cx px",
-        "cy px",
-        "k1",
-        "k2",
-        "p1",
-        "p2",
-        "k3",
-        "X mm",
-        "Y mm",
-        "Z mm",
-    )
+    terms = TERM_NAMES[calibration.cameras[0].interior.lens_model]
+    head = ("camera", "f px", "cx px", "cy px", *terms, "X mm", "Y mm", "Z mm")
     rows = []
     for camera in calibration.cameras:
         inner = camera.interior

@@ -183,7 +183,7 @@ def calibration_page(record: CalibrationRecord, views: Sequence[DetectionView] =
     quality = calibration.quality
     colour = Light.YELLOW if quality.warnings else Light.GREEN
     told = "Calibrated" if quality.converged else f"Not converged ({quality.stop.value})"
-    if not quality.converged or calibration.doubtful_lenses:
+    if not quality.converged or calibration.doubtful_lenses or quality.unfit_lenses:
         colour = Light.RED
     cross = quality.cross_validation
     facts = [

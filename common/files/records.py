@@ -16,11 +16,18 @@ RecordT = TypeVar("RecordT")
 
 
 def model_of(record: type) -> type[StrictModel]:
-    """The strict model with the fields of a dataclass. Numbers that are not finite are null."""
+    """The strict model with the fields of a dataclass. Numbers that are not finite are null.
+
+    A field with a default may be left out, so that files from before there was one still read.
+    """
     hints = get_type_hints(record)
     # pydantic's signature cannot say that the values are (type, default) pairs.
     fields: dict[str, Any] = {
-        f.name: (_field_type(hints[f.name]), ...) for f in dataclasses.fields(record)
+        f.name: (
+            _field_type(hints[f.name]),
+            ... if f.default is dataclasses.MISSING else f.default,
+        )
+        for f in dataclasses.fields(record)
     }
     return create_model(record.__name__, __base__=StrictModel, **fields)
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from common.errors import InputError
 from geometry.arrays import Floats, frozen
-from geometry.camera import RigCamera, distort
+from geometry.camera import RigCamera, bends, distort
 from geometry.frames import Pose
 
 Singles = NDArray[np.float32]
@@ -99,7 +99,7 @@ def view_of(image: Coded, camera: RigCamera) -> View:
     clipped = np.asarray(colour.max(axis=2) >= SATURATED * full)
     eight: Bytes = np.asarray(colour // (256 if colour.dtype == np.uint16 else 1), dtype=np.uint8)
     matrix = np.asarray(kind.camera_matrix, dtype=np.float64)
-    if np.any(kind.distortion):
+    if bends(kind.distortion):
         grey, eight, clipped = _undistorted(grey, eight, clipped, matrix, kind.distortion)
     return View(camera.name, grey, eight, frozen(matrix), camera.pose, clipped)
 

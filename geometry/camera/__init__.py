@@ -1,33 +1,53 @@
 """The camera: sensor, lens, interior orientation, body. Projections happen in here only."""
 
-from geometry.camera.model import Body, Camera, RigCamera
-from geometry.camera.projection import (
-    INTERIOR_NAMES,
+from geometry.camera.distortion import (
     NO_DISTORTION,
-    ImagePartials,
+    TERM_COUNTS,
+    TERM_NAMES,
+    LensModel,
+    bends,
     distort,
     distort_partials,
     fold_radius,
+    model_of,
+    own_terms,
+    undistort,
+)
+from geometry.camera.model import Body, Camera, RigCamera
+from geometry.camera.projection import (
+    INTERIOR,
+    INTERIOR_NAMES,
+    STRETCH,
+    ImagePartials,
     interior_vector,
+    lens_terms,
     perspective,
     perspective_partials,
     project,
     project_partials,
     rotation_partials,
-    undistort,
 )
 
 __all__ = [
+    "INTERIOR",
     "INTERIOR_NAMES",
     "NO_DISTORTION",
+    "STRETCH",
+    "TERM_COUNTS",
+    "TERM_NAMES",
     "Body",
     "Camera",
     "ImagePartials",
+    "LensModel",
     "RigCamera",
+    "bends",
     "distort",
     "distort_partials",
     "fold_radius",
     "interior_vector",
+    "lens_terms",
+    "model_of",
+    "own_terms",
     "perspective",
     "perspective_partials",
     "project",

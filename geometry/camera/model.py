@@ -9,7 +9,16 @@ import numpy as np
 
 from common.errors import InputError
 from geometry.arrays import Floats, frozen
-from geometry.camera.projection import NO_DISTORTION, distort, fold_radius, perspective, undistort
+from geometry.camera.distortion import (
+    NO_DISTORTION,
+    TERM_COUNTS,
+    LensModel,
+    distort,
+    fold_radius,
+    model_of,
+    undistort,
+)
+from geometry.camera.projection import perspective
 from geometry.frames import Pose
 
 
@@ -74,7 +83,8 @@ class Camera:
 
     ``image_size_px`` (width, height); ``pixel_pitch_mm`` the distance of square pixels;
     ``principal_point_px`` (2,) with pixel centres at integers; ``distortion`` (5,) Brown-Conrady
-    k1, k2, p1, p2, k3; ``circle_of_confusion_mm`` the largest blur disk that counts as sharp.
+    k1, k2, p1, p2, k3, or (8,) or (4,) as in :mod:`geometry.camera.distortion`;
+    ``circle_of_confusion_mm`` the largest blur disk that counts as sharp.
     ``focus_distance_mm`` None lets the design choose it per camera.
     Raises :class:`InputError` for impossible values.
     """
@@ -123,16 +133,24 @@ class Camera:
             centre = (np.array(self.image_size_px, dtype=np.float64) - 1.0) / 2.0
         distortion = frozen(self.distortion)
         _require(
-            distortion.shape == (5,) and bool(np.isfinite(distortion).all()),
+            distortion.ndim == 1
+            and len(distortion) in TERM_COUNTS
+            and bool(np.isfinite(distortion).all()),
             "camera-distortion",
-            f"camera {self.name!r} does not have five finite distortion terms",
-            "give distortion = [k1, k2, p1, p2, k3]",
+            f"camera {self.name!r} does not have five, eight or four finite distortion terms",
+            "give distortion = [k1, k2, p1, p2, k3], with k4, k5, k6 for a rational lens, or "
+            "[k1, k2, k3, k4] for a fisheye",
         )
         object.__setattr__(self, "principal_point_px", frozen(centre))
         object.__setattr__(self, "distortion", distortion)
         object.__setattr__(
             self, "image_size_px", (int(self.image_size_px[0]), int(self.image_size_px[1]))
         )
+
+    @property
+    def lens_model(self) -> LensModel:
+        """By which equations the lens bends."""
+        return model_of(self.distortion)
 
     @property
     def focal_length_px(self) -> float:
@@ -185,7 +203,7 @@ class Camera:
             all(bool(np.isfinite(edge).all()) for edge in (left, right, top, bottom)),
             "camera-distortion-folds",
             f"the distortion of camera {self.name!r} turns back on itself within the image",
-            "give the distortion [k1, k2, p1, p2, k3] of a calibration that covers the whole image",
+            "give the distortion of a calibration that covers the whole image",
         )
         return np.array([left[:, 0].max(), right[:, 0].min(), top[:, 1].max(), bottom[:, 1].min()])
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from common.errors import InputError
-from geometry.camera import RigCamera
+from geometry.camera import LensModel, RigCamera
 
 Cameras = tuple[RigCamera, ...]
 Files = Mapping[str, bytes]
@@ -50,7 +50,7 @@ class Format:
     """One export: what it is for, which files it makes, and how.
 
     ``files`` names them for a listing; ``{image}`` stands for one file per camera. ``write``
-    makes their contents from checked cameras.
+    makes their contents from checked cameras. ``lenses``: which lens models the format can say.
     """
 
     name: str
@@ -58,6 +58,7 @@ class Format:
     description: str
     files: tuple[str, ...]
     write: Callable[[Cameras, ExportOptions], Files]
+    lenses: tuple[LensModel, ...] = (LensModel.BROWN,)
 
 
 def image_stem(camera_name: str) -> str:
@@ -90,3 +91,15 @@ def check_cameras(cameras: Cameras) -> None:
                 "give each a name of its own",
             )
         owners[stem] = camera.name
+
+
+def check_lenses(cameras: Cameras, form: Format) -> None:
+    """Raise :class:`InputError` for a lens that the format has no words for."""
+    for camera in cameras:
+        lens = camera.camera.lens_model
+        if lens not in form.lenses:
+            raise InputError(
+                "export-lens-model",
+                f"{form.name} has no {lens.name.lower()} lens, and camera {camera.name!r} has one",
+                "export to opencv or colmap-text, which have, or calibrate with --model brown",
+            )

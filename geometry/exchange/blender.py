@@ -9,9 +9,14 @@ from __future__ import annotations
 
 import json
 
-from geometry.camera import RigCamera
+from geometry.camera import LensModel, RigCamera
 from geometry.exchange.base import Cameras, ExportOptions, Files, Format, image_name
-from geometry.exchange.conventions import METRES_PER_MM, graphics_camera_to_rig, principal_offset_px
+from geometry.exchange.conventions import (
+    METRES_PER_MM,
+    distortion_key,
+    graphics_camera_to_rig,
+    principal_offset_px,
+)
 
 _SCRIPT = '''\
 """Builds the cameras of a rig. Run it in Blender's text editor, or: blender --python FILE"""
@@ -39,7 +44,9 @@ for given in CAMERAS:
     camera.dof.aperture_fstop = given["f_number"]
     camera["image"] = given["image"]
     camera["image_size_px"] = given["image_size_px"]
-    camera["distortion_k1_k2_p1_p2_k3"] = given["distortion_k1_k2_p1_p2_k3"]
+    for key in given:
+        if key.startswith("distortion_"):
+            camera[key] = given[key]
     holder = bpy.data.objects.new(given["name"], camera)
     holder.matrix_world = Matrix(given["matrix_world"])
     collection.objects.link(holder)
@@ -68,7 +75,7 @@ def _camera(rig_camera: RigCamera, options: ExportOptions) -> dict[str, object]:
         "shift_y": float(down) / width + 0.0,
         "focus_distance_m": rig_camera.focus_distance_mm * METRES_PER_MM,
         "f_number": camera.f_number,
-        "distortion_k1_k2_p1_p2_k3": camera.distortion.tolist(),
+        distortion_key(camera): camera.distortion.tolist(),
         "matrix_world": graphics_camera_to_rig(rig_camera.pose, METRES_PER_MM).tolist(),
     }
 
@@ -86,4 +93,5 @@ FORMAT = Format(
     "a Python script that builds the cameras",
     ("cameras_blender.py",),
     write,
+    tuple(LensModel),
 )

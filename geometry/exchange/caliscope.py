@@ -9,6 +9,7 @@ import json
 
 import numpy as np
 
+from geometry.camera import LensModel
 from geometry.exchange.base import Cameras, ExportOptions, Files, Format
 from geometry.exchange.conventions import METRES_PER_MM, number_lists, translation_mm
 
@@ -31,6 +32,8 @@ def write(cameras: Cameras, _options: ExportOptions) -> Files:
             f"rotation = {number_lists(np.asarray(pose.rotation_rig_to_camera))}",
             "ignore = false",
         ]
+        if kind.lens_model is LensModel.FISHEYE:
+            lines.append("fisheye = true")
         tables.append("\n".join(lines) + "\n")
     return {"camera_array.toml": "\n".join(tables).encode()}
 
@@ -41,4 +44,5 @@ FORMAT = Format(
     "a camera array as TOML",
     ("camera_array.toml",),
     write,
+    (LensModel.BROWN, LensModel.FISHEYE),
 )

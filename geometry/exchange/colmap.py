@@ -14,7 +14,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from geometry.arrays import Floats
-from geometry.camera import Camera
+from geometry.camera import Camera, LensModel
 from geometry.exchange.base import Cameras, ExportOptions, Files, Format, image_name
 from geometry.exchange.conventions import (
     METRES_PER_MM,
@@ -25,16 +25,20 @@ from geometry.exchange.conventions import (
 )
 from geometry.frames import Pose
 
-MODEL_NUMBERS = {"PINHOLE": 1, "OPENCV": 4, "FULL_OPENCV": 6}
+MODEL_NUMBERS = {"PINHOLE": 1, "OPENCV": 4, "OPENCV_FISHEYE": 5, "FULL_OPENCV": 6}
 CAMERA_SENSOR = 0
 RIG_ID = FRAME_ID = 1
 
 
 def lens_model(camera: Camera) -> tuple[str, Floats]:
     """COLMAP's smallest model that holds the camera's distortion, and its parameters."""
-    k1, k2, p1, p2, k3 = camera.distortion
     f, (cx, cy) = camera.focal_length_px, corner_principal_point_px(camera)
     pinhole = [f, f, cx, cy]
+    if camera.lens_model is LensModel.FISHEYE:
+        return "OPENCV_FISHEYE", np.array([*pinhole, *camera.distortion])
+    if camera.lens_model is LensModel.RATIONAL:
+        return "FULL_OPENCV", np.array([*pinhole, *camera.distortion])
+    k1, k2, p1, p2, k3 = camera.distortion
     if not camera.distortion.any():
         return "PINHOLE", np.array(pinhole)
     if k3 == 0.0:
@@ -129,6 +133,7 @@ TEXT = Format(
     "a sparse model with rig and frame as text",
     tuple(f"{part}.txt" for part in _PARTS),
     write_text,
+    tuple(LensModel),
 )
 BINARY = Format(
     "colmap-binary",
@@ -136,4 +141,5 @@ BINARY = Format(
     "the same in COLMAP's binary form",
     tuple(f"{part}.bin" for part in _PARTS),
     write_binary,
+    tuple(LensModel),
 )

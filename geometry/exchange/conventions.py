@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from geometry.arrays import Floats
-from geometry.camera import Camera
+from geometry.camera import TERM_NAMES, Camera
 from geometry.frames import PHOTO_TO_CV, Pose
 
 METRES_PER_MM = 1e-3
@@ -48,6 +48,11 @@ def quaternion_wxyz(rotation: Floats) -> Floats:
 def translation_mm(pose: Pose) -> Floats:
     """``T`` of ``x_camera = R X + T``, (3,)."""
     return np.asarray(-pose.rotation_rig_to_camera @ pose.position_rig_mm)
+
+
+def distortion_key(camera: Camera) -> str:
+    """The name under which programs without lens distortion keep it, with its terms in order."""
+    return "_".join(["distortion", *TERM_NAMES[camera.lens_model]])
 
 
 def corner_principal_point_px(camera: Camera) -> Floats:

@@ -13,9 +13,14 @@ import struct
 import numpy as np
 
 from geometry.arrays import Floats
-from geometry.camera import Camera, RigCamera
+from geometry.camera import Camera, LensModel, RigCamera
 from geometry.exchange.base import Cameras, ExportOptions, Files, Format, image_name
-from geometry.exchange.conventions import GLTF_FROM_RIG_AXES, METRES_PER_MM, graphics_camera_to_rig
+from geometry.exchange.conventions import (
+    GLTF_FROM_RIG_AXES,
+    METRES_PER_MM,
+    distortion_key,
+    graphics_camera_to_rig,
+)
 
 MARKER_DEPTH_M = 0.05
 NEAR_M, FAR_M = 0.01, 10.0
@@ -59,7 +64,7 @@ def _extras(rig_camera: RigCamera, options: ExportOptions) -> dict[str, object]:
         "image": image_name(rig_camera, options),
         "image_size_px": list(camera.image_size_px),
         "camera_matrix": camera.camera_matrix.tolist(),
-        "distortion_k1_k2_p1_p2_k3": camera.distortion.tolist(),
+        distortion_key(camera): camera.distortion.tolist(),
     }
 
 
@@ -147,4 +152,5 @@ FORMAT = Format(
     "a GLB scene with the cameras",
     ("cameras.glb",),
     write,
+    tuple(LensModel),
 )

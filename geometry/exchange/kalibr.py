@@ -1,7 +1,8 @@
 """Kalibr: a camchain, each camera placed from the one before it.
 
 World to camera as everywhere, ``T_cn_cnm1`` leads from the camera before to this one, metres,
-pixel centres at integers. The model radtan has k1, k2, p1 and p2, and no k3.
+pixel centres at integers. The model radtan has k1, k2, p1 and p2, and no k3; equidistant is the
+fisheye.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import numpy as np
 
 from common.errors import InputError
 from geometry.arrays import Floats
-from geometry.camera import Camera, RigCamera, distort_partials
+from geometry.camera import Camera, LensModel, RigCamera, distort_partials
 from geometry.exchange.base import Cameras, ExportOptions, Files, Format
 from geometry.exchange.conventions import METRES_PER_MM, number_lists, translation_mm
 
@@ -55,17 +56,19 @@ def _from_before(camera: RigCamera, before: RigCamera) -> Floats:
 
 
 def write(cameras: Cameras, _options: ExportOptions) -> Files:
-    """``camchain.yaml``: pinhole cameras with radtan distortion."""
+    """``camchain.yaml``: pinhole cameras with radtan or equidistant distortion."""
     lines: list[str] = []
     for index, one in enumerate(cameras):
         kind = one.camera
+        fisheye = kind.lens_model is LensModel.FISHEYE
+        terms = kind.distortion if fisheye else radtan(kind, one.name)
         f, (cx, cy) = kind.focal_length_px, kind.principal_point_px
         lines += [
             f"cam{index}:",
             "  camera_model: pinhole",
             f"  intrinsics: {number_lists(np.array([f, f, cx, cy]))}",
-            "  distortion_model: radtan",
-            f"  distortion_coeffs: {number_lists(radtan(kind, one.name))}",
+            f"  distortion_model: {'equidistant' if fisheye else 'radtan'}",
+            f"  distortion_coeffs: {number_lists(terms)}",
             f"  resolution: [{kind.image_size_px[0]}, {kind.image_size_px[1]}]",
             # JSON's quotes are YAML's: a name with a colon must stay a string.
             f"  rostopic: {json.dumps(f'/{one.name}/image_raw', ensure_ascii=False)}",
@@ -78,7 +81,8 @@ def write(cameras: Cameras, _options: ExportOptions) -> Files:
 FORMAT = Format(
     "kalibr",
     "Kalibr",
-    "a camchain of pinhole cameras with radtan distortion",
+    "a camchain of pinhole cameras with radtan or equidistant distortion",
     ("camchain.yaml",),
     write,
+    (LensModel.BROWN, LensModel.FISHEYE),
 )

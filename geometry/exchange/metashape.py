@@ -11,7 +11,7 @@ import csv
 import io
 from xml.etree import ElementTree as Xml
 
-from geometry.camera import Camera
+from geometry.camera import Camera, LensModel
 from geometry.exchange.base import Cameras, ExportOptions, Files, Format, image_stem
 from geometry.exchange.conventions import (
     METRES_PER_MM,
@@ -100,4 +100,5 @@ CSV = Format(
     "projection centres and angles for the Reference pane",
     ("reference.csv",),
     write_csv,
+    tuple(LensModel),
 )

@@ -12,7 +12,8 @@ from __future__ import annotations
 
 import json
 
-from geometry.camera import RigCamera
+from common.errors import InputError
+from geometry.camera import TERM_NAMES, LensModel, RigCamera
 from geometry.exchange.base import Cameras, ExportOptions, Files, Format, image_name
 from geometry.exchange.conventions import (
     METRES_PER_MM,
@@ -25,7 +26,7 @@ IMAGES = "images"
 
 def _frame(rig_camera: RigCamera, options: ExportOptions) -> dict[str, object]:
     camera = rig_camera.camera
-    k1, k2, p1, p2, k3 = (float(v) for v in camera.distortion)
+    terms = zip(TERM_NAMES[camera.lens_model], camera.distortion.tolist(), strict=True)
     cx, cy = corner_principal_point_px(camera)
     return {
         "file_path": f"{IMAGES}/{image_name(rig_camera, options)}",
@@ -35,11 +36,7 @@ def _frame(rig_camera: RigCamera, options: ExportOptions) -> dict[str, object]:
         "cy": float(cy),
         "w": camera.image_size_px[0],
         "h": camera.image_size_px[1],
-        "k1": k1,
-        "k2": k2,
-        "k3": k3,
-        "p1": p1,
-        "p2": p2,
+        **dict(sorted(terms)),
         "transform_matrix": graphics_camera_to_rig(rig_camera.pose, METRES_PER_MM).tolist(),
     }
 
@@ -62,11 +59,23 @@ def _split(paths: list[object]) -> dict[str, list[object]]:
     return {"train_filenames": trained, "val_filenames": held, "test_filenames": held}
 
 
+def _model(cameras: Cameras) -> str:
+    """Nerfstudio's name of the lens model, one for all frames."""
+    lenses = {camera.camera.lens_model for camera in cameras}
+    if len(lenses) > 1:
+        raise InputError(
+            "export-lens-model",
+            "nerfstudio takes one lens model, and these cameras have several",
+            "export to opencv or colmap-text, which take each camera's own",
+        )
+    return "OPENCV_FISHEYE" if LensModel.FISHEYE in lenses else "OPENCV"
+
+
 def write(cameras: Cameras, options: ExportOptions) -> Files:
     """``transforms.json``."""
     frames = [_frame(camera, options) for camera in cameras]
     split = _split([frame["file_path"] for frame in frames])
-    document = {"camera_model": "OPENCV", **split, "frames": frames}
+    document = {"camera_model": _model(cameras), **split, "frames": frames}
     return {"transforms.json": (json.dumps(document, indent=1) + "\n").encode()}
 
 
@@ -76,4 +85,5 @@ FORMAT = Format(
     "transforms.json with the intrinsics of each frame",
     ("transforms.json",),
     write,
+    (LensModel.BROWN, LensModel.FISHEYE),
 )

@@ -11,7 +11,7 @@ import json
 import numpy as np
 
 from geometry.arrays import Floats
-from geometry.camera import RigCamera
+from geometry.camera import LensModel, RigCamera
 from geometry.exchange.base import Cameras, ExportOptions, Files, Format, image_name
 from geometry.exchange.conventions import number, translation_mm
 
@@ -37,11 +37,17 @@ def _camera(rig_camera: RigCamera, options: ExportOptions) -> list[str]:
         f"      image: {json.dumps(image_name(rig_camera, options), ensure_ascii=False)}",
         f"      image_width: {camera.image_size_px[0]}",
         f"      image_height: {camera.image_size_px[1]}",
+        *_model(camera.lens_model),
         *_matrix("camera_matrix", camera.camera_matrix),
         *_matrix("distortion_coefficients", camera.distortion[None, :]),
         *_matrix("rotation", np.asarray(pose.rotation_rig_to_camera)),
         *_matrix("translation_mm", translation_mm(pose)[:, None]),
     ]
+
+
+def _model(lens: LensModel) -> list[str]:
+    """Said of a fisheye only: ``cv2.fisheye`` takes its four terms, all else the others."""
+    return ["      model: fisheye"] if lens is LensModel.FISHEYE else []
 
 
 def write(cameras: Cameras, options: ExportOptions) -> Files:
@@ -58,4 +64,5 @@ FORMAT = Format(
     "camera matrices, distortion, rotations and translations for FileStorage",
     ("cameras.yml",),
     write,
+    tuple(LensModel),
 )

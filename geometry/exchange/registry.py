@@ -20,7 +20,14 @@ from geometry.exchange import (
     realityscan,
     usd,
 )
-from geometry.exchange.base import Cameras, ExportOptions, Files, Format, check_cameras
+from geometry.exchange.base import (
+    Cameras,
+    ExportOptions,
+    Files,
+    Format,
+    check_cameras,
+    check_lenses,
+)
 
 FORMATS: dict[str, Format] = {
     form.name: form
@@ -58,10 +65,11 @@ def export_files(name: str, cameras: Cameras, options: ExportOptions | None = No
     """The files of the export ``name`` by relative name; nothing is written.
 
     Raises :class:`NotFoundError` for an unknown format and :class:`InputError` for cameras
-    that it cannot tell apart.
+    that it cannot tell apart, or with lenses that it cannot describe.
     """
     form = find_format(name)
     check_cameras(cameras)
+    check_lenses(cameras, form)
     return form.write(cameras, options or ExportOptions())
 
 

@@ -12,7 +12,7 @@ from importlib import import_module
 from typing import Any
 
 from common.errors import InputError
-from geometry.camera import RigCamera
+from geometry.camera import LensModel, RigCamera
 from geometry.exchange.base import Cameras, ExportOptions, Files, Format, image_name, image_stem
 from geometry.exchange.conventions import (
     CENTIMETRES_PER_MM,
@@ -94,4 +94,5 @@ FORMAT = Format(
     "a USD stage with the cameras (needs the extra usd)",
     ("cameras.usda",),
     write,
+    tuple(LensModel),
 )

@@ -48,8 +48,8 @@ class PlacedCamera(StrictModel):
         description="Width and height of the image."
     )
     camera_matrix: Matrix = Field(description="OpenCV camera matrix, pixel centres at integers.")
-    distortion: Annotated[list[float], Len(5, 5)] = Field(
-        description="Brown-Conrady k1, k2, p1, p2, k3."
+    distortion: Annotated[list[float], Len(4, 8)] = Field(
+        description="Brown-Conrady k1, k2, p1, p2, k3; eight terms rational, four a fisheye."
     )
     focus_distance_mm: float | None = Field(default=None, gt=0.0, description="Focus setting.")
     fixed: bool = Field(

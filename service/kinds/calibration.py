@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from service.kinds.base import Figure, JobKind, Request, Result
 from service.kinds.detection import Detection
-from service.kinds.lens import LensParameter
+from service.kinds.lens import LENS_TERMS, LensChoice, LensParameter
 
 Triple = Annotated[list[float], Field(min_length=3, max_length=3)]
 
@@ -27,11 +27,15 @@ class CalibrationRequest(Request):
     poses_known_to: Annotated[
         KnownPoses | None, Field(description="The design's poses give the frame, this well.")
     ] = None
+    model: Annotated[
+        LensChoice | None,
+        Field(description="Lens model of all cameras; the design's without it, and brown."),
+    ] = None
     hold: Annotated[
-        list[LensParameter], Field(max_length=9, description="Lens parameters not to adjust.")
+        list[LensParameter], Field(max_length=12, description="Lens parameters not to adjust.")
     ] = Field(default_factory=list)
     free: Annotated[
-        list[LensParameter], Field(max_length=9, description="Lens parameters without a prior.")
+        list[LensParameter], Field(max_length=12, description="Lens parameters without a prior.")
     ] = Field(default_factory=list)
     cross_validate: Annotated[
         bool, Field(description="Calibrate two halves as well, and compare.")
@@ -42,6 +46,12 @@ class CalibrationRequest(Request):
         both = sorted(set(self.hold) & set(self.free))
         if both:
             raise ValueError(f"{both[0]} is among hold and among free")
+        terms = {"f", "cx", "cy", "b1", *LENS_TERMS[self.model or LensChoice.brown]}
+        foreign = [name for name in self.free if name not in terms]
+        if foreign and (self.model is not None or foreign[0] in ("k4", "k5", "k6")):
+            raise ValueError(
+                f"the {(self.model or LensChoice.brown).value} lens model has no {foreign[0].value}"
+            )
         return self
 
 
@@ -64,7 +74,10 @@ class CameraCalibration(Result):
     focal_sigma_px: Figure
     principal_point_px: list[float]
     principal_point_sigma_px: Figure
-    distortion: Annotated[list[float], Field(description="k1, k2, p1, p2, k3.")]
+    distortion: Annotated[
+        list[float],
+        Field(description="k1, k2, p1, p2, k3; with k4, k5, k6, or of a fisheye k1 to k4."),
+    ]
     position_mm: Triple
     position_sigma_mm: Figure
     rotation_rig_to_camera: list[Triple]
@@ -92,6 +105,10 @@ class CalibrationResult(Result):
     doubtful_lenses: Annotated[
         list[str],
         Field(description="Cameras whose focal length is too uncertain: do not use the result."),
+    ] = Field(default_factory=list)
+    unfit_lenses: Annotated[
+        list[str],
+        Field(description="Cameras whose lenses another model fits better: do not use the result."),
     ] = Field(default_factory=list)
     cameras: list[CameraCalibration]
 

@@ -34,6 +34,7 @@ from calibration.report import (
 )
 from calibration.targets.files import read_targets
 from common.progress import Progress, ProgressCallback, within
+from geometry.camera import LensModel
 from rig.design.designfile import read_design
 from service.jobs.engine import Running, Task
 from service.kinds.acceptance import AcceptanceRequest, AcceptanceResult
@@ -51,7 +52,7 @@ def calibration(
     plan = read_targets(task.inputs["targets"])
     views: list[DetectionView] = []
     seen = see(plan, task, running, lambda found: views.extend(detection_views(found)), True)
-    options = _options(task.request, task.inputs)
+    options = options_of(task.request, task.inputs)
     done = calibrate(seen.observations, options, _after(running.report), running.cancel)
     warnings = (*seen.left_out, *seen.thrown_out(), *done.quality.warnings)
     done = replace(done, quality=replace(done.quality, warnings=warnings))
@@ -62,7 +63,8 @@ def calibration(
     return calibration_result(done, detection_of(seen))
 
 
-def _options(request: CalibrationRequest, inputs: Mapping[str, Path]) -> CalibrationOptions:
+def options_of(request: CalibrationRequest, inputs: Mapping[str, Path]) -> CalibrationOptions:
+    """What a request and its design ask of the adjustment."""
     start: tuple[CalibratedCamera, ...] = ()
     if "design" in inputs:
         start = tuple(map(CalibratedCamera.from_rig, read_design(inputs["design"]).cameras))
@@ -76,6 +78,7 @@ def _options(request: CalibrationRequest, inputs: Mapping[str, Path]) -> Calibra
         if known is None
         else ReferencePoses(known.position_sigma_mm, known.rotation_sigma_deg),
         cross_validate=request.cross_validate,
+        lens=None if request.model is None else LensModel[request.model.name.upper()],
     )
 
 

@@ -33,6 +33,7 @@ def calibration_result(calibration: Calibration, detection: Detection) -> Calibr
         datum=calibration.datum,
         warnings=list(quality.warnings),
         doubtful_lenses=list(calibration.doubtful_lenses),
+        unfit_lenses=list(quality.unfit_lenses),
         cameras=[_camera(camera, own) for camera, own in cameras],
     )
 

@@ -17,7 +17,7 @@ from calibration.adjustment import (
     calibrate,
 )
 from calibration.adjustment.build import Start
-from calibration.adjustment.camera import PER_CAMERA
+from calibration.adjustment.camera import INTERIOR, PER_CAMERA
 from calibration.adjustment.datum import inner_constraints
 from calibration.adjustment.initialisation.finding import find_start
 from calibration.adjustment.levenberg import Solution, Stop, adjust
@@ -113,7 +113,7 @@ def test_the_free_datum_neither_moves_nor_turns_the_cameras(
     constraint = inner_constraints(solution.state, network)
     core = solution.reduction.covariance().core[: network.core_count, : network.core_count]
     spread = np.sqrt(np.abs(np.diag(constraint.T @ core @ constraint)))
-    largest = float(np.sqrt(np.diag(core)[9:12].max()))
+    largest = float(np.sqrt(np.diag(core)[INTERIOR : INTERIOR + 3].max()))
     # Zero but for rounding, beside the sigmas of single cameras.
     assert spread.max() < 1e-6 * largest
 
@@ -130,7 +130,7 @@ def test_redundancy_numbers_add_up_to_the_degrees_of_freedom(
     spread = np.einsum("maa->ma", covariance.targets())[known]
     total += np.sum(1.0 - spread / priors.target_sigma[known] ** 2)
     known = np.isfinite(priors.interior_sigma) & (priors.interior_sigma > 0)
-    variances = np.diag(covariance.cameras).reshape(-1, PER_CAMERA)[:, :9]
+    variances = np.diag(covariance.cameras).reshape(-1, PER_CAMERA)[:, :INTERIOR]
     total += np.sum(1.0 - variances[known] / priors.interior_sigma[known] ** 2)
     from calibration.adjustment.components import length_partials
 
@@ -213,7 +213,7 @@ def test_what_nobody_stated_is_added_to_all_points_alike() -> None:
     np.testing.assert_allclose(sharp, 0.1, rtol=0.2)
     assert (blunt / sharp < 1.3).all()
     right = calibrate(observations, CalibrationOptions(start=SCENE.cameras, cross_validate=False))
-    sigmas = [np.sqrt(np.diag(c.covariance.cameras)[9::15]) for c in (found, right)]
+    sigmas = [np.sqrt(np.diag(c.covariance.cameras)[INTERIOR::PER_CAMERA]) for c in (found, right)]
     np.testing.assert_allclose(sigmas[0] / sigmas[1], 1.0, atol=0.15)
 
 
@@ -224,7 +224,10 @@ def test_a_wrong_stated_sigma_is_corrected() -> None:
     # 2500 image points tell a sigma to 1.4 %; three of those, and Huber's share.
     np.testing.assert_allclose(sigmas_in_use(found, 0.05), 0.1, rtol=0.05)
     right = calibrate(observations, CalibrationOptions(start=SCENE.cameras, cross_validate=False))
-    ratio = np.diag(found.covariance.cameras)[9::15] / np.diag(right.covariance.cameras)[9::15]
+    ratio = (
+        np.diag(found.covariance.cameras)[INTERIOR::PER_CAMERA]
+        / np.diag(right.covariance.cameras)[INTERIOR::PER_CAMERA]
+    )
     np.testing.assert_allclose(ratio, 1.0, atol=0.15)
 
 

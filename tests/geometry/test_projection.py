@@ -28,7 +28,22 @@ from geometry.frames import Pose
 TERMS = np.array([-0.21, 0.09, 1.2e-3, -2.1e-3, 0.03])
 BARREL = np.array([-0.2, 0.0, 0.0, 0.0, 0.0])
 PINCUSHION = np.array([0.3, 0.1, 0.0, 0.0, 0.05])
-LENSES = [TERMS, BARREL, PINCUSHION, np.array([-0.3, 0.1, 2e-3, 1e-3, -0.02])]
+RATIONAL = np.array([1.2, -0.3, 8e-4, -6e-4, 0.02, 1.5, 0.1, -0.01])
+FISHEYE = np.array([-0.03, 0.012, -0.006, 0.0009])
+LENSES = [
+    *(TERMS, BARREL, PINCUSHION, np.array([-0.3, 0.1, 2e-3, 1e-3, -0.02])),
+    *(RATIONAL, FISHEYE, np.zeros(4)),
+]
+
+
+def opencvs(points_camera_mm: Floats, matrix: Floats, distortion: Floats) -> Floats:
+    """OpenCV's pixels (n, 2) of points in the camera frame."""
+    nowhere, given = np.zeros(3), np.ascontiguousarray(points_camera_mm)
+    if len(distortion) == 4:
+        found = cv2.fisheye.projectPoints(given[:, None], nowhere, nowhere, matrix, distortion)
+    else:
+        found = cv2.projectPoints(given, nowhere, nowhere, matrix, distortion)
+    return np.asarray(found[0]).reshape(-1, 2)
 
 
 def points(seed: int = 1, count: int = 40) -> Floats:
@@ -52,52 +67,49 @@ def test_pixels_are_opencvs(distortion: Floats) -> None:
     kind, turn = camera(distortion), np.array([0.3, -0.2, 1.1])
     pose = Pose(np.array([30.0, -20.0, 10.0]), turned(turn))
     seen = pose.to_rig(points())
-    theirs, _ = cv2.projectPoints(
-        seen,
-        turn,
-        -pose.rotation_rig_to_camera @ pose.position_rig_mm,
-        kind.camera_matrix,
-        distortion,
-    )
+    theirs = opencvs(pose.to_camera(seen), kind.camera_matrix, distortion)
     pixels, depth = kind.project(pose, seen)
     # Pixels of a few hundred, computed by another order of the same dozen operations.
-    np.testing.assert_allclose(pixels, theirs[:, 0], atol=1e-9)
+    np.testing.assert_allclose(pixels, theirs, atol=1e-9)
     np.testing.assert_allclose(depth, points()[:, 2])
     interior = interior_vector(kind.focal_length_px, kind.principal_point_px, distortion)
-    np.testing.assert_allclose(project(pose.to_camera(seen), interior)[0], theirs[:, 0], atol=1e-9)
+    np.testing.assert_allclose(project(pose.to_camera(seen), interior)[0], theirs, atol=1e-9)
 
 
 @pytest.mark.parametrize("distortion", LENSES)
 def test_partials_agree_with_central_differences(distortion: Floats) -> None:
-    interior = np.array([1500.0, 640.0, 480.0, *distortion, 2e-3])
+    interior = interior_vector(1500.0, np.array([640.0, 480.0]), distortion, 2e-3)
     rotation, centre = turned(np.array([0.3, -0.2, 1.1])), np.array([30.0, -20.0, 10.0])
     local = points()
     rig = local @ rotation + centre
 
     def pixels(change: Floats) -> Floats:
-        """Of changes by the point, the centre, the turn and the interior: 3 + 3 + 3 + 9."""
+        """Of changes by the point, the centre, the turn and the interior: 3 + 3 + 3 + 12."""
         moved = rig + change[:3] - centre - change[3:6]
         own = moved @ (turned(change[6:9]) @ rotation).T
-        return project(own, interior + change[9:])[0]
+        return project(own, interior + np.append(change[9:], 0.0))[0]
 
     parts = project_partials(local, rotation, interior)
-    closed = np.concatenate([parts.by_point, parts.by_pose, parts.by_interior], axis=-1)
-    for column in range(18):
+    # The last is the number of the lens model, which is no quantity.
+    assert not parts.by_interior[..., -1].any()
+    closed = np.concatenate([parts.by_point, parts.by_pose, parts.by_interior[..., :-1]], axis=-1)
+    for column in range(21):
         # Steps that move the image by about a pixel: the cubic term of a difference is then
         # below 1e-6 of the derivative, rounding (1e-13 px) below 1e-9 of it.
         step = 3e-4 if 6 <= column < 9 else 1e-4 if column >= 12 else 1e-1
-        change = np.zeros(18)
+        change = np.zeros(21)
         change[column] = step
         numeric = (pixels(change) - pixels(-change)) / (2.0 * step)
-        scale = np.abs(numeric).max()
+        scale = max(np.abs(numeric).max(), 1e-9)
         np.testing.assert_allclose(closed[..., column] / scale, numeric / scale, atol=2e-6)
     np.testing.assert_allclose(parts.by_point, parts.by_point_camera @ rotation)
-    np.testing.assert_allclose(parts.pixels, pixels(np.zeros(18)), rtol=1e-13)
+    np.testing.assert_allclose(parts.pixels, pixels(np.zeros(21)), rtol=1e-13)
 
 
 def test_one_interior_for_each_point_is_the_same_as_one_at_a_time() -> None:
     local, rng = points(count=6), np.random.default_rng(2)
-    interiors = np.array([1500.0, 640.0, 480.0, *TERMS, 2e-3]) * rng.uniform(0.9, 1.1, (6, 9))
+    lenses = [TERMS, RATIONAL, FISHEYE, BARREL, np.zeros(4), PINCUSHION]
+    interiors = np.stack([interior_vector(1500.0, np.array([640.0, 480.0]), k) for k in lenses])
     rotations = np.stack([turned(v) for v in rng.normal(size=(6, 3))])
     together = project_partials(local, rotations, interiors)
     for k in range(6):
@@ -192,3 +204,38 @@ def test_a_point_beyond_the_fold_is_not_imaged_back_inside() -> None:
 def test_distortion_that_folds_within_the_image_is_refused() -> None:
     with pytest.raises(InputError, match="turns back on itself within the image"):
         camera(np.array([-1.0, 0.0, 0.0, 0.0, 0.0]), pitch_mm=0.02).frame_limits()
+
+
+@pytest.mark.parametrize("degrees", [10.0, 60.0, 80.0, 89.0])
+def test_a_fisheye_sees_and_looks_back_to_the_edge_of_half_space(degrees: float) -> None:
+    angle = np.radians(degrees)
+    there = np.array([[np.cos(0.7), np.sin(0.7)]]) * np.tan(angle)
+    bent = distort(there, FISHEYE)
+    k = FISHEYE
+    along = angle * (1.0 + sum(k[j] * angle ** (2 * j + 2) for j in range(4)))
+    # Kannala and Brandt's own sum, in another order.
+    assert np.hypot(*bent[0]) == pytest.approx(along, rel=1e-13)
+    back = undistort(bent, FISHEYE)
+    # Slope of the radius by the tangent at 89 degrees is cos^2: 3e-4, so 1e-9 there is 3e-6 here.
+    np.testing.assert_allclose(np.degrees(np.arctan(np.hypot(*back[0]))), degrees, atol=1e-6)
+
+
+def test_a_fisheye_folds_where_its_angles_do() -> None:
+    terms = np.array([-0.25, 0.0, 0.0, 0.0])
+    # 1 - 0.75 a^2 = 0.
+    assert fold_radius(terms) == pytest.approx(np.tan((1.0 / 0.75) ** 0.5), rel=1e-12)
+    assert fold_radius(np.zeros(4)) == np.inf
+
+
+def test_a_rational_lens_ends_where_its_divisor_vanishes() -> None:
+    terms = np.array([0.0, 0.0, 0.0, 0.0, 0.0, -0.25, 0.0, 0.0])
+    # r / (1 - r^2 / 4) grows up to r = 2.
+    assert fold_radius(terms) == pytest.approx(2.0, rel=1e-12)
+    # r / (1 + r^2) turns at 1.
+    assert fold_radius(np.array([0.0] * 5 + [1.0, 0.0, 0.0])) == pytest.approx(1.0, rel=1e-12)
+
+
+@pytest.mark.parametrize("count", [0, 3, 6, 7, 9])
+def test_terms_of_no_model_are_refused(count: int) -> None:
+    with pytest.raises(InputError, match="distortion terms"):
+        camera(np.zeros(count))

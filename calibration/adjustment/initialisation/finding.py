@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from calibration.adjustment.initialisation.carrierposes import Placing, place_ca
 from calibration.adjustment.initialisation.chain import LocatedView, chain, located_views
 from calibration.adjustment.initialisation.frame import as_cameras, to_start, upright
 from calibration.adjustment.initialisation.interiors import start_interiors
+from calibration.adjustment.initialisation.lenses import as_lens
 from calibration.adjustment.initialisation.relative import Scene, relative_chain
 from calibration.adjustment.initialisation.resection import RigidTransform
 from calibration.adjustment.initialisation.scale import knows_size, size_of
@@ -22,6 +23,7 @@ from calibration.adjustment.options import CalibrationOptions
 from calibration.observations import Observations
 from common.errors import InputError
 from geometry.arrays import Floats
+from geometry.camera import LensModel
 from geometry.frames import Pose
 
 NEAR_SHARE = 0.02
@@ -80,6 +82,10 @@ def find_start(observations: Observations, options: CalibrationOptions) -> Start
     scenery = _scenery(observations, options)
     near = _ordered(observations, options)
     if near:
+        if options.lens is not None:
+            near = tuple(
+                replace(c, interior=i) for c, i in zip(near, scenery.interiors, strict=True)
+            )
         poses = camera_poses(near)
         start = build(observations, near, scenery.placements, scenery.placing(poses), options)
         if median_misfit_px(start) < NEAR_SHARE * float(scenery.focal_px.min()):
@@ -120,11 +126,18 @@ def _ordered(
 def _scenery(observations: Observations, options: CalibrationOptions) -> _Scenery:
     placements = Placements.of(observations)
     views, nominal = views_of(observations, placements), nominal_points(observations)
-    known = {c.name: c.interior for c in options.start} | dict(options.interiors)
+    sizes = dict(zip(observations.cameras, observations.image_size_px, strict=True))
+    given = {c.name: c.interior for c in options.start} | dict(options.interiors)
+    known = {
+        name: interior if options.lens is None else as_lens(interior, options.lens, sizes[name])
+        for name, interior in given.items()
+        if name in sizes
+    }
     if all(name in known for name in observations.cameras):
         interiors = tuple(known[name] for name in observations.cameras)
     else:
-        interiors = start_interiors(observations, views, nominal)
+        lens = options.lens or LensModel.BROWN
+        interiors = start_interiors(observations, views, nominal, lens)
     normalised = np.empty_like(observations.pixel)
     for k, interior in enumerate(interiors):
         own = observations.camera == k

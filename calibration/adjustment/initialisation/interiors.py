@@ -7,31 +7,38 @@ from scipy.linalg import rq
 
 from calibration.adjustment.camera import Interior
 from calibration.adjustment.finite import finite_rows
+from calibration.adjustment.initialisation.lenses import as_lens, fisheye_start
 from calibration.adjustment.initialisation.resection import interior_from_planes
 from calibration.adjustment.initialisation.views import View, is_planar
 from calibration.observations import Observations
 from common.errors import InputError
 from geometry.arrays import Floats
+from geometry.camera import LensModel
 
 LEAST_FOR_PLANE = 6
 LEAST_FOR_BODY = 8
 
 
 def start_interiors(
-    observations: Observations, views: tuple[View, ...], points_mm: Floats
+    observations: Observations, views: tuple[View, ...], points_mm: Floats, lens: LensModel
 ) -> tuple[Interior, ...]:
     """Interiors of all cameras from views of known carriers; ``points_mm`` (m, 3), NaN unknown.
 
+    Their lenses are of the model ``lens``.
     Raises :class:`InputError` for a camera whose views do not determine one.
     """
     return tuple(
-        _interior(observations, [v for v in views if v.camera == k], points_mm, k)
+        _interior(observations, [v for v in views if v.camera == k], points_mm, k, lens)
         for k in range(len(observations.cameras))
     )
 
 
 def _interior(
-    observations: Observations, views: list[View], points_mm: Floats, camera: int
+    observations: Observations,
+    views: list[View],
+    points_mm: Floats,
+    camera: int,
+    lens: LensModel,
 ) -> Interior:
     width, height = (int(v) for v in observations.image_size_px[camera])
     planes, bodies = [], []
@@ -43,18 +50,23 @@ def _interior(
             planes.append(seen)
         elif known.sum() >= LEAST_FOR_BODY and not is_planar(seen[0]):
             bodies.append(seen)
+    if lens is LensModel.FISHEYE and (planes or bodies):
+        found = fisheye_start([*planes, *bodies], (width, height))
+        if found is not None:
+            return found
     for points, pixels in sorted(bodies, key=lambda b: -len(b[0])):
         found = _from_body(points, pixels, (width, height))
         if found is not None:
-            return found
+            return as_lens(found, lens, (width, height))
     if planes:
-        found = interior_from_planes(planes, (width, height))
+        found = interior_from_planes(planes, (width, height), lens is LensModel.RATIONAL)
         if found is not None:
-            return found
+            return as_lens(found, lens, (width, height))
     raise InputError(
         "calibration-interior",
         f"the views of camera {observations.cameras[camera]!r} do not determine its focal length",
-        "show it a plate at several tilts, or give a start camera with the focal length",
+        "show it a plate at several tilts, give a start camera with the focal length, or where "
+        "it sees more than 120 degrees calibrate with the fisheye model",
     )
 
 

@@ -67,9 +67,12 @@ def placed_candidates(points_mm: Floats, normalised: Floats) -> list[RigidTransf
 
 
 def interior_from_planes(
-    views: list[tuple[Floats, Floats]], size_px: tuple[int, int]
+    views: list[tuple[Floats, Floats]], size_px: tuple[int, int], rational: bool = False
 ) -> Interior | None:
-    """Interior from views of plates, (points (n, 3), pixels (n, 2)) each (Zhang's method)."""
+    """Interior from views of plates, (points (n, 3), pixels (n, 2)) each (Zhang's method).
+
+    Of Brown's terms as many as it takes; ``rational`` ones where those do not suffice.
+    """
     cv2 = _cv2()
     views = sorted(views, key=lambda v: -len(v[0]))[:MAX_VIEWS]
     flat = [_in_plane(points)[0] for points, _ in views]
@@ -81,16 +84,19 @@ def interior_from_planes(
     if len(views) < 4:
         held |= cv2.CALIB_FIX_PRINCIPAL_POINT | cv2.CALIB_FIX_K1
         higher = higher[:1]
+    elif rational:
+        higher.append(cv2.CALIB_RATIONAL_MODEL)
     found = None
     for terms in higher:
         try:
             guess = cv2.initCameraMatrix2D(objects, images, size_px, 1.0)
             _, matrix, told, _, _ = cv2.calibrateCamera(
-                objects, images, size_px, guess, np.zeros(5), flags=held | terms
+                objects, images, size_px, guess, np.zeros(8), flags=held | terms
             )
         except cv2.error:
             return found  # the views do not determine a camera
-        found = _start_of(matrix, np.ravel(told)[:5], size_px) or found
+        count = 8 if terms & cv2.CALIB_RATIONAL_MODEL else 5
+        found = _start_of(matrix, np.ravel(told)[:count], size_px) or found
         # A few terms of a wide lens fold back within the picture: more of them may not.
         if found is not None and _sees_all(found, views):
             break

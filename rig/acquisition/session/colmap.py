@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from geometry.camera import Camera, RigCamera
+from geometry.camera import Camera, LensModel, RigCamera
 from geometry.exchange.conventions import corner_principal_point_px, quaternion_wxyz
 
 RIG = "rig1"
@@ -31,13 +31,18 @@ def _camera(name: str, placed: RigCamera, reference: RigCamera) -> dict[str, obj
         shift = theirs.position_rig_mm - ours.position_rig_mm
         entry["cam_from_rig_rotation"] = quaternion_wxyz(rotation).tolist()
         entry["cam_from_rig_translation"] = (ours.rotation_rig_to_camera @ shift).tolist()
-    entry["camera_model_name"] = "FULL_OPENCV"
-    entry["camera_params"] = full_opencv(placed.camera)
+    fisheye = placed.camera.lens_model is LensModel.FISHEYE
+    entry["camera_model_name"] = "OPENCV_FISHEYE" if fisheye else "FULL_OPENCV"
+    entry["camera_params"] = lens_parameters(placed.camera)
     return entry
 
 
-def full_opencv(camera: Camera) -> list[float]:
-    """fx, fy, cx, cy, k1, k2, p1, p2, k3, k4, k5, k6 with COLMAP's pixel centres."""
+def lens_parameters(camera: Camera) -> list[float]:
+    """fx, fy, cx, cy, k1, k2, p1, p2, k3, k4, k5, k6 with COLMAP's pixel centres.
+
+    Of a fisheye fx, fy, cx, cy, k1, k2, k3, k4.
+    """
     f, (cx, cy) = camera.focal_length_px, corner_principal_point_px(camera)
-    k1, k2, p1, p2, k3 = camera.distortion.tolist()
-    return [f, f, float(cx), float(cy), k1, k2, p1, p2, k3, 0.0, 0.0, 0.0]
+    terms = camera.distortion.tolist()
+    none = [0.0, 0.0, 0.0] if camera.lens_model is LensModel.BROWN else []
+    return [f, f, float(cx), float(cy), *terms, *none]

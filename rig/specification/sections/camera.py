@@ -124,9 +124,10 @@ class CameraSection(StrictModel):
         gt=0.0,
         description="Focus setting. Without it the design chooses one per camera.",
     )
-    distortion: Annotated[list[float], Len(5, 5)] = Field(
+    distortion: Annotated[list[float], Len(4, 8)] = Field(
         default_factory=lambda: [0.0] * 5,
-        description="Brown-Conrady terms k1, k2, p1, p2, k3 (OpenCV's order).",
+        description="Brown-Conrady terms k1, k2, p1, p2, k3 (OpenCV's order), with k4, k5, k6 "
+        "for a rational lens, or k1, k2, k3, k4 of a fisheye.",
     )
     principal_point_px: Pair | None = Field(
         default=None,

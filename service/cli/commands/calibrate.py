@@ -16,7 +16,7 @@ from service.cli.options import (
     TargetsOption,
     WorkersOption,
 )
-from service.kinds.lens import LensParameter
+from service.kinds.lens import LensChoice, LensParameter
 
 
 def calibrate(
@@ -32,6 +32,13 @@ def calibrate(
         ),
     ] = None,
     capture: CaptureOption = None,
+    model: Annotated[
+        LensChoice | None,
+        typer.Option(
+            help="How the lenses bend: brown (the usual), rational for wide ones, fisheye.",
+            show_default=False,
+        ),
+    ] = None,
     hold: Annotated[
         list[LensParameter] | None,
         typer.Option(help="A lens parameter to leave as it is.", show_default=False),
@@ -55,8 +62,8 @@ def calibrate(
 ) -> None:
     """Calibrate all cameras of a rig from pictures of targets.
 
-    Exit code: 0 done, 2 bad input, 4 do not use it (not converged, or the pictures leave a focal
-    length open), 130 interrupted.
+    Exit code: 0 done, 2 bad input, 4 do not use it (not converged, the pictures leave a focal
+    length open, or another lens model fits better), 130 interrupted.
 
     Example:  rigwright calibrate pictures --targets targets/targets.toml --out calibration
     """
@@ -78,7 +85,7 @@ def calibrate(
             sigma_mm, sigma_deg = poses_known_to
             known = KnownPoses(position_sigma_mm=sigma_mm, rotation_sigma_deg=sigma_deg)
         request = CalibrationRequest(
-            name=name, hold=hold or [], free=free or [], poses_known_to=known
+            name=name, model=model, hold=hold or [], free=free or [], poses_known_to=known
         )
         inputs = {**source.inputs, "targets": target_set}
         if design is not None:
@@ -92,5 +99,5 @@ def calibrate(
         else:
             measurement_tables.print_calibration(result)
             print_files(files_of(out))
-    if not result.converged or result.doubtful_lenses:
+    if not result.converged or result.doubtful_lenses or result.unfit_lenses:
         raise typer.Exit(NOT_WELL)
