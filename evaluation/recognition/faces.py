@@ -9,7 +9,7 @@ import numpy as np
 
 from common.errors import InputError
 from evaluation.recognition.frame import FaceFrame, face_frame
-from evaluation.recognition.rangeimage import FACE_GRID, range_image
+from evaluation.recognition.rangeimage import FACE_GRID, foremost, range_image
 from geometry.arrays import Floats, frozen
 from geometry.face import nose_tip
 from geometry.reading import read_scan
@@ -59,7 +59,8 @@ def face_of(scan: Scan) -> RangeFace:
 def registered(points_mm: Floats, tip_mm: Floats, axes: Floats) -> RangeFace:
     """The face in points (n, 3) that begins from a rough tip (3,) and rough axes (3, 3)."""
     frame = face_frame(points_mm, tip_mm, axes)
-    return RangeFace(range_image(frame.local(points_mm), FACE_GRID), frame)
+    local = frame.local(points_mm)
+    return RangeFace(range_image(local[foremost(local, FACE_GRID)], FACE_GRID), frame)
 
 
 def points_near(scan: Scan, tip_mm: Floats) -> Floats:

@@ -13,26 +13,31 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from common.errors import InputError
-from evaluation.recognition.rangeimage import Grid, range_image, smoothed
+from evaluation.recognition.rangeimage import Grid, foremost, range_image, smoothed
 from geometry.arrays import Bools, Floats, frozen
 
 BRIDGE_DEG = 33.0
 """The bridge of the nose leans by that much against the frame's vertical, by definition."""
 
 COARSE = Grid(2.0, 62.0, -56.0, 66.0)
+_START = Grid(2.0, 90.0, -90.0, 100.0)
 _STEPS = 30
 _SETTLED_DEG, _SETTLED_MM = 0.15, 0.25
 _BRIDGE_MM = (9.0, 27.0)
 """Above the tip: there the bridge is nearly straight; lower is the ball, higher the brow."""
 
 _TIP_MM = 6.0
+_LOOK_MM = 10.0
+"""Lips may stand out farther than the tip while the head is still bowed."""
+
 _LEAST_TIP = 0.7
 _MOST_MOVED_MM = 10.0
 """Faces whose place was found for certain had it right to 4 mm."""
 _LEAST_BRIDGE = 0.6
-_DAMPING = 0.6
+_DAMPING, _SWINGING = 0.6, 10
+_MOST_REST_DEG, _MOST_REST_MM = 1.0, 1.0
 _MOST_ASYMMETRY_MM = 2.5
-_MOST_BEND_MM = 1.5
+_MOST_BEND_MM = 2.5
 _REACH_MM = 105.0
 LEAST_SHARE = 0.5
 _LEAST_BOTH = 0.35
@@ -72,23 +77,28 @@ def face_frame(points_mm: Floats, tip_mm: Floats, axes: Floats) -> FaceFrame:
     origin, turn = np.array(tip_mm, dtype=np.float64), np.array(axes, dtype=np.float64)
     moved_deg, moved_mm = np.inf, np.inf
     image, profile = np.zeros(COARSE.shape), _Profile(0.0, 0.0, 0.0, 0.0)
-    for _ in range(_STEPS):
+    near = near[foremost((near - origin) @ turn.T, _START)]
+    for step in range(_STEPS):
         image = range_image((near - origin) @ turn.T, COARSE)
         _require_enough(image)
         rotvec, shift = _symmetry_step(image)
         profile = _profile(image)
-        # Turning moves the stretch that is taken for the bridge: whole steps swing.
-        pitch = float(np.clip(_DAMPING * (BRIDGE_DEG - profile.lean_deg), -6.0, 6.0))
-        lift = (-profile.tip_height_mm, _DAMPING * profile.tip_z_mm)
+        # Turning moves the stretch that is taken for the bridge: whole steps swing, and where
+        # the nose is bumpy even part of a step may.
+        damping = _DAMPING * 0.5 ** max(0.0, (step - _SWINGING) / 4.0)
+        pitch = float(np.clip(damping * (BRIDGE_DEG - profile.lean_deg), -6.0, 6.0))
+        lift = (-profile.tip_height_mm, damping * profile.tip_z_mm)
         rotation = Rotation.from_rotvec([np.radians(pitch), rotvec[0], rotvec[1]]).as_matrix()
         # The tip moves with the turn as the points do.
         origin = origin + turn.T @ np.array([shift, lift[0], lift[1]])
         turn = rotation.T @ turn
         moved_deg = float(np.degrees(np.linalg.norm(rotvec)) + abs(pitch))
         moved_mm = float(abs(shift) + np.abs(lift).sum())
-        if moved_deg < _SETTLED_DEG / 10.0 and moved_mm < _SETTLED_MM / 10.0:
+        if moved_deg < _SETTLED_DEG / 8.0 and moved_mm < _SETTLED_MM / 8.0:
             break
-    if moved_deg > _SETTLED_DEG or moved_mm > _SETTLED_MM:
+    rest_deg = abs(profile.lean_deg - BRIDGE_DEG)
+    settled = rest_deg <= _MOST_REST_DEG and abs(profile.tip_z_mm) <= _MOST_REST_MM
+    if not settled or moved_deg > _SETTLED_DEG or moved_mm > _SETTLED_MM:
         raise _unsure("its symmetry plane and nose do not settle")
     if np.linalg.norm(origin - tip_mm) > _MOST_MOVED_MM:
         raise _unsure("the tip of its nose is not where a face has it")
@@ -189,7 +199,7 @@ def _profile(image: Floats) -> _Profile:
 def _tip(image: Floats) -> tuple[float, float]:
     """Place along z and height of the highest point of the nose, by a paraboloid about it."""
     x, z = np.meshgrid(COARSE.x_mm, COARSE.z_mm)
-    about = (np.abs(x) <= 5.0) & (np.abs(z) <= 16.0) & np.isfinite(image)
+    about = (np.abs(x) <= 5.0) & (np.abs(z) <= _LOOK_MM) & np.isfinite(image)
     if about.sum() < 25:
         raise _unsure("the tip of its nose was not measured")
     blurred = smoothed(np.where(about, image, np.nan), 0.8)

@@ -15,6 +15,9 @@ _LEAST_WEIGHT = 0.15
 _STRAY_MM = 8.0
 _MEDIAN_CELLS = 5
 _LAYER_MM = 6.0
+"""For each millimetre of the step: steep flanks are one layer."""
+
+_REACH = 2
 
 
 @dataclass(frozen=True)
@@ -51,30 +54,40 @@ FACE_GRID = Grid(1.0, 60.0, -65.0, 75.0)
 def range_image(points_mm: Floats, grid: Grid) -> Floats:
     """How far the surface of points (n, 3) stands out, mm, (h, w); NaN where nothing is near.
 
-    Points are in the face's own frame: x to its left, y into the head, z up. At each place a
-    plane is fitted to the points about it, weighted by a Gaussian of one step (moving least
-    squares), so that uneven density shifts nothing; of several layers the foremost counts.
+    Points are in the face's own frame: x to its left, y into the head, z up, and of one layer
+    (:func:`foremost`). At each place a plane is fitted to the points about it, weighted by a
+    Gaussian of one step (moving least squares), so that uneven density shifts nothing.
     """
-    row, column, height = _front_layer(points_mm, grid)
-    return _fitted(row, column, height, grid.shape)
+    column = (points_mm[:, 0] - grid.x_mm[0]) / grid.step_mm
+    row = (points_mm[:, 2] - grid.z_mm[0]) / grid.step_mm
+    inside = _inside(row, column, grid)
+    return _fitted(row[inside], column[inside], -points_mm[inside, 1], grid.shape)
 
 
-def _front_layer(points_mm: Floats, grid: Grid) -> tuple[Floats, Floats, Floats]:
-    """Rows, columns (in steps) and heights of the points on the outermost surface."""
+def foremost(points_mm: Floats, grid: Grid) -> Bools:
+    """Which points (n, 3) within the grid lie on the outermost surface and are no strays, (n,)."""
+    out = np.zeros(len(points_mm), dtype=np.bool_)
     height = -points_mm[:, 1]
     column = (points_mm[:, 0] - grid.x_mm[0]) / grid.step_mm
     row = (points_mm[:, 2] - grid.z_mm[0]) / grid.step_mm
     rows, columns = grid.shape
-    inside = (row > -0.5) & (row < rows - 0.5) & (column > -0.5) & (column < columns - 0.5)
-    row, column, height = row[inside], column[inside], height[inside]
-    cell = _cells(row, column, columns)
+    inside = np.flatnonzero(_inside(row, column, grid))
+    cell, height = _cells(row[inside], column[inside], columns), height[inside]
     top = _highest(cell, height, rows * columns)
     known = np.isfinite(top).reshape(rows, columns)
     # A lone point in front of the face would hide what is behind it.
     kept = height <= _median(top.reshape(rows, columns), known).ravel()[cell] + _STRAY_MM
-    row, column, height, cell = row[kept], column[kept], height[kept], cell[kept]
-    kept = height >= _highest(cell, height, rows * columns)[cell] - _LAYER_MM
-    return row[kept], column[kept], height[kept]
+    inside, cell, height = inside[kept], cell[kept], height[kept]
+    kept = height >= _highest(cell, height, rows * columns)[cell] - _LAYER_MM * grid.step_mm
+    out[inside[kept]] = True
+    return out
+
+
+def _inside(row: Floats, column: Floats, grid: Grid) -> Bools:
+    rows, columns = grid.shape
+    return np.asarray(
+        (row > -0.5) & (row < rows - 0.5) & (column > -0.5) & (column < columns - 0.5)
+    )
 
 
 def _highest(cell: Ints, height: Floats, count: int) -> Floats:
@@ -127,24 +140,28 @@ def _fitted(row: Floats, column: Floats, height: Floats, shape: tuple[int, int])
 
 def _about(sums: list[Floats]) -> list[Floats]:
     """Gaussian sums of the moments, each moved to the middle of the cell that it is taken to."""
-    reach = range(-2, 3)
-    out = [np.zeros_like(sums[0]) for _ in sums]
-    n, u, v, uu, uv, vv, h, uh, vh = (np.pad(s, 2) for s in sums)
-    rows, columns = sums[0].shape
-    for a in reach:
-        for b in reach:
-            w = float(np.exp(-0.5 * (a * a + b * b)))
-            part = (slice(2 + a, 2 + a + rows), slice(2 + b, 2 + b + columns))
-            n_, u_, v_, h_ = n[part], u[part], v[part], h[part]
-            moved = (
-                n_, u_ + a * n_, v_ + b * n_,
-                uu[part] + 2 * a * u_ + a * a * n_,
-                uv[part] + a * v_ + b * u_ + a * b * n_,
-                vv[part] + 2 * b * v_ + b * b * n_,
-                h_, uh[part] + a * h_, vh[part] + b * h_,
-            )  # fmt: skip
-            for total, value in zip(out, moved, strict=True):
-                total += w * value
+    n, u, v, uu, uv, vv, h, uh, vh = sums
+    n, u, v, uu, uv, vv, h, uh, vh = _along(0, n, u, v, uu, uv, vv, h, uh, vh)
+    n, v, u, vv, uv, uu, h, vh, uh = _along(1, n, v, u, vv, uv, uu, h, vh, uh)
+    return [n, u, v, uu, uv, vv, h, uh, vh]
+
+
+def _along(axis: int, *moments: Floats) -> list[Floats]:
+    """The sums along one axis, whose coordinate is the first of the two."""
+    out = [np.zeros_like(m) for m in moments]
+    pad = [(_REACH, _REACH) if k == axis else (0, 0) for k in range(2)]
+    padded = [np.pad(m, pad) for m in moments]
+    count = moments[0].shape[axis]
+    for a in range(-_REACH, _REACH + 1):
+        part = [np.take(m, range(_REACH + a, _REACH + a + count), axis) for m in padded]
+        n, u, v, uu, uv, vv, h, uh, vh = part
+        weight = float(np.exp(-0.5 * a * a))
+        moved = (
+            *(n, u + a * n, v, uu + 2 * a * u + a * a * n, uv + a * v, vv),
+            *(h, uh + a * h, vh),
+        )
+        for total, value in zip(out, moved, strict=True):
+            total += weight * value
     return out
 
 

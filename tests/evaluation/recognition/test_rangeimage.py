@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from evaluation.recognition.rangeimage import FACE_GRID, range_image
+from evaluation.recognition.rangeimage import FACE_GRID, foremost, range_image
 from geometry.arrays import Floats
 
 
@@ -36,7 +36,8 @@ def test_holes_stay_holes_and_strays_go() -> None:
     points = slope(150_000, 1)
     hole = np.hypot(points[:, 0] - 20.0, points[:, 2] - 10.0) < 8.0
     stray = np.array([[-20.0, -60.0, -10.0], [0.0, -45.0, 40.0]])
-    image = range_image(np.concatenate([points[~hole], stray]), FACE_GRID)
+    given = np.concatenate([points[~hole], stray])
+    image = range_image(given[foremost(given, FACE_GRID)], FACE_GRID)
     x, z = np.meshgrid(FACE_GRID.x_mm, FACE_GRID.z_mm)
     away = np.hypot(x - 20.0, z - 10.0)
     # Sums reach two places and a half from the rim.
@@ -50,18 +51,21 @@ def test_holes_stay_holes_and_strays_go() -> None:
 def test_the_foremost_of_two_layers_counts() -> None:
     front, behind = slope(150_000, 2), slope(150_000, 3)
     behind[:, 1] += 25.0
-    image = range_image(np.concatenate([front, behind]), FACE_GRID)
+    both = np.concatenate([front, behind])
+    image = range_image(both[foremost(both, FACE_GRID)], FACE_GRID)
     assert np.nanmedian(np.abs(image - expected())) < 0.01
 
 
 def test_nothing_near_is_an_image_of_holes() -> None:
-    assert np.isnan(range_image(np.full((5, 3), 500.0), FACE_GRID)).all()
+    far = np.full((5, 3), 500.0)
+    assert np.isnan(range_image(far, FACE_GRID)).all()
+    assert not foremost(far, FACE_GRID).any()
 
 
 def test_sparse_points_lose_no_steep_flank() -> None:
     x, z = (g.ravel() for g in np.meshgrid(np.arange(-62, 62, 1.7), np.arange(-68, 78, 1.7)))
     roof = np.stack([x, np.abs(x), z], axis=1)
-    image = range_image(roof, FACE_GRID)
+    image = range_image(roof[foremost(roof, FACE_GRID)], FACE_GRID)
     assert np.isfinite(image[:, 1:-1]).mean() > 0.99
     flank = np.abs(FACE_GRID.x_mm) > 5.0
     # Slopes are held by a twentieth, and points lie up to 0.85 mm to one side.
