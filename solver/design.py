@@ -231,7 +231,9 @@ def search_knows(limits: Limits) -> bool:
 
 def _searched_jobs(request: Request, cancel: CancelToken) -> list[StartJob]:
     """The best networks of the search among candidates, unless poses to start from are given."""
-    if request.start is not None or request.strategy is not Strategy.EXCHANGE:
+    # The classical starts know nothing of what can be matched.
+    asked = request.strategy is Strategy.EXCHANGE or request.limits.matching.required
+    if request.start is not None or not asked:
         return []
     found = search_networks(
         request.subject,

@@ -6,7 +6,9 @@ import numpy as np
 
 from common.progress import CancelToken
 from geometry.arrays import Floats
-from solver.coverage.views import views
+from solver.coverage.matchable import lacks
+from solver.coverage.views import centres_mm, views
+from solver.coverage.visibility import cast_rays
 from solver.formulation import (
     COVERAGE,
     SATISFIED,
@@ -92,4 +94,8 @@ def _coverage(problem: Problem, values: Floats) -> list[Relaxation]:
         missing = tier.share - float((seen >= tier.views).mean())
         if missing > 0.0:
             out.append(Relaxation(f"coverage_{tier.views}", "", missing, missing))
-    return out
+    check, limit = problem.subject.check_points, problem.limits.incidence.ray_max_deg
+    position, eyes = problem.visibility_positions[0], centres_mm(problem, state)
+    found = cast_rays(check, problem.subject.occluder, eyes, limit, (position,))
+    lacking = lacks(problem, state, position, found)
+    return out + [Relaxation(name, "", lack, lack) for name, lack in lacking.items()]

@@ -15,6 +15,22 @@ from common.errors import InputError
 
 
 @dataclass(frozen=True)
+class PairTier:
+    """At least ``share`` of the points that can be matched is in ``pairs`` such pairs or more."""
+
+    pairs: int
+    share: float
+
+    def __post_init__(self) -> None:
+        if self.pairs < 1 or not 0.0 < self.share <= 1.0:
+            raise InputError(
+                "limit-value",
+                f"matching asks for {self.share:g} of the points in {self.pairs} pairs",
+                "give pairs >= 1 and 0 < share <= 1",
+            )
+
+
+@dataclass(frozen=True)
 class Matching:
     """Which pairs of cameras can match a point, and which cameras belong together.
 
@@ -24,12 +40,21 @@ class Matching:
     cameras that share at least ``least_shared`` of the points in this way are joined; cameras
     that are joined, directly or through others, are a group. Raises :class:`InputError` for
     what no pair could meet.
+
+    Where it is ``required`` it is a limit: the ``tiers`` hold, and all cameras are one group.
     """
 
     max_angle_deg: float = 40.0
     max_incidence_deg: float = 70.0
     max_scale_ratio: float = 1.5
     least_shared: float = 0.1
+    required: bool = False
+    tiers: tuple[PairTier, ...] = (PairTier(1, 0.995),)
+
+    @property
+    def demanded(self) -> tuple[PairTier, ...]:
+        """The tiers that are limits."""
+        return self.tiers if self.required else ()
 
     def __post_init__(self) -> None:
         wrong = (

@@ -12,7 +12,7 @@ from geometry.camera import RigCamera
 from geometry.frames import Pose
 from geometry.optics import blur_disk_mm, depth_of_field_mm, ground_sample_distance_mm
 from geometry.subject import Subject
-from solver.constraints.table import constraint_table
+from solver.constraints.table import constraint_table, row
 from solver.coverage.matchable import Matchable, MatchableViews
 from solver.coverage.views import in_frame
 from solver.coverage.visibility import cast_rays
@@ -20,7 +20,14 @@ from solver.information import normal_matrices
 from solver.limits import Limits
 from solver.motion import HeadPosition
 from solver.problem import Problem
-from solver.result import CameraTable, CoverageShare, PointTable, Quality
+from solver.result import (
+    CameraTable,
+    ConstraintRow,
+    CoverageShare,
+    PointTable,
+    Quality,
+    Sense,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,6 +98,7 @@ def evaluate(
     coverage = _coverage(problem, found)
     positions = zip(problem.visibility_positions, found, strict=True)
     matchable = tuple(matchable_views(problem, position, f) for position, f in positions)
+    judged = Matchable(subject, limits, matchable)
     return Quality(
         cost_mm2=float(points.norm_mm2.mean()),
         sigma_median_mm=float(np.median(points.sigma_mm)),
@@ -103,8 +111,33 @@ def evaluate(
         convergence_deg=convergence_table(cameras, subject.design_points.centroid_mm),
         cameras=_cameras(problem, rest),
         points=points,
-        constraints=constraint_table(problem, [f.visible for f in found], coverage),
-        matchable=Matchable(subject, limits, matchable),
+        constraints=(
+            *constraint_table(problem, [f.visible for f in found], coverage),
+            *_matching_rows(judged),
+        ),
+        matchable=judged,
+    )
+
+
+def _matching_rows(matchable: Matchable) -> tuple[ConstraintRow, ...]:
+    """The limits on matching, where they are limits."""
+    tiers = matchable.limits.matching.demanded
+    if not tiers:
+        return ()
+    groups = float(len(matchable.groups))
+    return (
+        *(
+            row(
+                f"matchable_{t.pairs}/all",
+                matchable.share(t.pairs),
+                t.share,
+                Sense.AT_LEAST,
+                "",
+                1.0,
+            )
+            for t in tiers
+        ),
+        row("groups/all", groups, 1.0, Sense.AT_MOST, "", 1.0),
     )
 
 

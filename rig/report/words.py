@@ -18,6 +18,8 @@ FAMILIES: dict[str, tuple[str, str]] = {
     "spacing": ("Spacing", "Mean distance of neighbouring cameras (Eq 13)."),
     "symmetry": ("Symmetry", "Camera positions are symmetric about the subject (Eqs 14, 15)."),
     "coverage": ("Coverage", "Share of the region that enough cameras see."),
+    "matchable": ("Matchable", "Share of what can be matched that enough pairs of cameras can."),
+    "groups": ("Groups", "Cameras hang together by the surface that they can match."),
     "depth_of_field": ("Sharpness", "Every seen point lies within the depth of field."),
     "min_focus": ("Nearest focus", "No seen point is nearer than the lens can focus."),
     "gsd": ("Pixel size", "Size of a pixel on the subject."),
@@ -45,5 +47,6 @@ def family_words(family: str) -> tuple[str, str]:
     key = max(known, key=len)
     title, words = FAMILIES[key]
     rest = family[len(key) :].strip("_").replace("_", " ")
-    rest = f"{rest} or more views" if rest.isdigit() else ENDS.get(rest, rest)
+    counted = "pairs" if key == "matchable" else "views"
+    rest = f"{rest} or more {counted}" if rest.isdigit() else ENDS.get(rest, rest)
     return f"{title}, {rest}" if rest else title, words

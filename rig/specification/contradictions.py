@@ -25,6 +25,7 @@ def check_limits(camera: Camera, limits: Limits, cameras_in_all: int) -> None:
     """Raise :class:`InputError` ``limits-contradict`` that names the two that clash."""
     _check_frame(camera, limits)
     _check_views(limits, cameras_in_all)
+    _check_pairs(limits, cameras_in_all)
     _check_base_height(limits)
     _check_spacing(limits)
     _check_distance(camera, limits)
@@ -47,6 +48,17 @@ def _check_views(limits: Limits, cameras_in_all: int) -> None:
                 f"limits.coverage asks for {tier.views} views",
                 f"the rig has {cameras_in_all} cameras",
                 "ask for fewer views or give more cameras",
+            )
+
+
+def _check_pairs(limits: Limits, cameras_in_all: int) -> None:
+    most = cameras_in_all * (cameras_in_all - 1) // 2
+    for tier in limits.matching.demanded:
+        if tier.pairs > most:
+            raise _clash(
+                f"matching asks for {tier.pairs} pairs",
+                f"{cameras_in_all} cameras are {most}",
+                "ask for fewer pairs or give more cameras",
             )
 
 

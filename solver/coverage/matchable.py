@@ -9,11 +9,15 @@ import numpy as np
 from scipy.sparse.csgraph import connected_components
 
 from geometry.arrays import Bools, Floats, Ints
+from geometry.raycast import Occluder
 from geometry.subject import Subject
-from solver.coverage.visibility import cast_rays
+from geometry.surface import SurfacePoints
+from solver.coverage.visibility import Visibility, cast_rays
 from solver.limits import HalfSpace, Limits, Sphere, Zone
 from solver.matching import Matching
-from solver.motion import rest
+from solver.motion import HeadPosition, rest
+from solver.problem import Problem
+from solver.variables import NetworkState
 
 _STEPS_DEG = (18.0, 6.0)
 """How far apart the places are that cameras could take: fine where the coarse ones see nothing."""
@@ -74,6 +78,10 @@ class MatchableViews:
         """Share of the points that each pair of cameras can match, (n, n), 0 on the diagonal."""
         return np.asarray(self._counted[1] / max(1, len(self.points_mm)))
 
+    def share(self, pairs: int, reachable: Bools) -> float:
+        """Share in so many pairs or more of the points that can be matched (q,)."""
+        return float((self.pairs_of_point[reachable] >= pairs).mean()) if reachable.any() else 0.0
+
     @cached_property
     def groups(self) -> tuple[tuple[int, ...], ...]:
         """Cameras that hang together by the surface that they share, the largest group first."""
@@ -112,7 +120,7 @@ class Matchable:
     def reachable(self) -> Bools:
         """Which points any pair could match, wherever it stood, (q,)."""
         matched = np.logical_or.reduce([v.pairs_of_point > 0 for v in self.positions])
-        return np.asarray(_reachable(self.subject, self.limits) | matched)
+        return np.asarray(reachable(self.subject, self.limits) | matched)
 
     @property
     def reachable_share(self) -> float:
@@ -121,15 +129,35 @@ class Matchable:
 
     def share(self, pairs: int) -> float:
         """Share in so many pairs or more, of the points that can be; the worst head position."""
-        can = self.reachable
-        if not can.any():
-            return 0.0
-        return min(float((v.pairs_of_point[can] >= pairs).mean()) for v in self.positions)
+        return min(v.share(pairs, self.reachable) for v in self.positions)
 
 
-def _reachable(subject: Subject, limits: Limits) -> Bools:
+def lacks(
+    problem: Problem, state: NetworkState, position: HeadPosition, found: Visibility
+) -> dict[str, float]:
+    """By how much each limit on matching is missed in one head position: shares, and groups.
+
+    ``found`` is what the cameras see of the check points; what they see they have in frame and
+    sharp, which other limits are for.
+    """
+    matching, subject = problem.limits.matching, problem.subject
+    if not matching.required:
+        return {}
+    centres = state.centre * problem.length_mm + problem.origin_mm
+    points = position.points(subject.check_points.points_mm)
+    depth = np.einsum("npk,nk->np", points[None] - centres[:, None], state.axis)
+    focal = np.array([c.camera.focal_length_px for c in problem.cameras])
+    usable = found.seen & (found.cosine >= np.cos(np.radians(matching.max_incidence_deg)))
+    views = MatchableViews(matching, usable, centres, points, depth / focal[:, None])
+    can = reachable(subject, problem.limits) | (views.pairs_of_point > 0)
+    out = {f"matchable_{t.pairs}": t.share - views.share(t.pairs, can) for t in matching.tiers}
+    out["groups"] = float(len(views.groups) - 1)
+    return {name: lack for name, lack in out.items() if lack > 0.0}
+
+
+def reachable(subject: Subject, limits: Limits) -> Bools:
     """Points (q,) that two places which a camera may take could match."""
-    middle, radius = subject.design_points.centroid_mm, subject.design_points.radius_mm
+    middle, radius = subject.check_points.centroid_mm, subject.check_points.radius_mm
     far = limits.stand_off.max_mm or np.inf
     distance = min(far, max(limits.stand_off.min_mm or 0.0, _RADII * radius))
     # Places nearer to each other than the fine grid exist, though none of its pairs is.
@@ -145,7 +173,8 @@ def _reachable(subject: Subject, limits: Limits) -> Bools:
         left = np.flatnonzero(~out)
         if len(left):
             points = left.tobytes(), eyes.tobytes()
-            out[left] = _matched_from(subject, matching, steepest, *points)
+            scene = subject.check_points, subject.occluder
+            out[left] = _matched_from(*scene, matching, steepest, *points)
     return out
 
 
@@ -156,7 +185,7 @@ def _outward(subject: Subject, step_deg: float) -> Floats:
     up, turn = 1.0 - 2.0 * k / count, np.pi * (1.0 + np.sqrt(5.0)) * k
     flat = np.sqrt(1.0 - up**2)
     every = np.stack([flat * np.cos(turn), flat * np.sin(turn), up], axis=1)
-    facing = subject.design_points.normals.mean(axis=0)
+    facing = subject.check_points.normals.mean(axis=0)
     length = float(np.linalg.norm(facing))
     # A subject that faces everywhere is looked at from everywhere.
     return every if length < 0.1 else every[every @ facing >= length * np.cos(_WIDEST_RAD)]
@@ -177,16 +206,20 @@ def _inside(zones: tuple[Zone, ...], places_mm: Floats) -> Bools:
 
 @lru_cache(maxsize=16)
 def _matched_from(
-    subject: Subject, matching: Matching, steepest_deg: float, points: bytes, eyes: bytes
+    check: SurfacePoints,
+    occluder: Occluder,
+    matching: Matching,
+    steepest_deg: float,
+    points: bytes,
+    eyes: bytes,
 ) -> Bools:
     """Which check points (k int64) two of the ``eyes`` (m, 3 doubles) could match, (k,).
 
     Kept: a design and all that is asked of it afterwards ask for the same again.
     """
-    places, source = np.frombuffer(eyes).reshape(-1, 3), subject.check_points
-    source = source.subset(np.frombuffer(points, dtype=np.int64))
-    at_rest = (rest(subject.design_points.centroid_mm),)
-    seen = cast_rays(source, subject.occluder, places, steepest_deg, at_rest).seen
+    places, source = np.frombuffer(eyes).reshape(-1, 3), check.subset(np.frombuffer(points, int))
+    at_rest = (rest(source.centroid_mm),)
+    seen = cast_rays(source, occluder, places, steepest_deg, at_rest).seen
     views = MatchableViews(matching, seen, places, source.points_mm, np.ones(seen.shape))
     out = np.zeros(len(source), dtype=np.bool_)
     for i in range(len(places) - 1):

@@ -10,6 +10,7 @@ from geometry.arrays import Bools, Floats, Ints
 from geometry.camera import RigCamera
 from geometry.surface import SurfacePoints
 from solver.coverage.assignment import FARTHEST_DEG, AssignedViews, Margins, assign_views
+from solver.coverage.matchable import lacks
 from solver.coverage.visibility import Visibility, cast_rays, cosines, tangent_planes
 from solver.problem import Problem
 from solver.variables import NetworkState
@@ -140,7 +141,8 @@ def views(
 class Judged:
     """Coverage as it will be judged: on the check points, at the worst head position.
 
-    ``shortfall`` is the share by which the worst tier is missed, 0 when all are met;
+    ``shortfall`` is the share by which the worst tier is missed, of views or of matchable pairs, or
+    how many groups of cameras there are too many; 0 when all is met;
     ``missed`` are indices of check points that would mend it, the easiest to win first.
     """
 
@@ -153,7 +155,8 @@ def judge(problem: Problem, state: NetworkState) -> Judged:
     tiers, source = problem.limits.coverage.tiers, problem.subject.check_points
     worst, missed = 0.0, [np.zeros(0, dtype=np.int64)]
     limit = problem.limits.incidence.ray_max_deg
-    for position in problem.visibility_positions if tiers else ():
+    asked = bool(tiers) or problem.limits.matching.required
+    for position in problem.visibility_positions if asked else ():
         found = cast_rays(
             source, problem.subject.occluder, centres_mm(problem, state), limit, (position,)
         )
@@ -162,6 +165,7 @@ def judge(problem: Problem, state: NetworkState) -> Judged:
             if camera.fixed:
                 seen[i] &= in_frame(camera, position.points(source.points_mm))
         count = seen.sum(axis=0)
+        worst = max([worst, *lacks(problem, state, position, replace(found, free=seen)).values()])
         for tier in tiers:
             lack = tier.share - float((count >= tier.views).mean())
             if lack > 0.0:

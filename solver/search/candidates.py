@@ -20,6 +20,7 @@ from solver.information import ray_information
 from solver.limits import Limits
 from solver.motion import visibility_positions
 from solver.problem import Problem, camera_at
+from solver.search.matches import Matches
 from solver.starts import better_roll
 
 STEP_DEG = 6.0
@@ -44,7 +45,8 @@ class Candidates:
     ``information`` (m, 6, p) of each camera's ray to each point, in 1/mm2 (xx, yy, zz, xy, xz,
     yz), zero where it does not see it; ``seen`` (m, p); ``share`` (p,) of all check points that
     each point stands for; ``position_mm`` (m, 3); ``distance_mm`` (m,) to the centroid;
-    ``fixed`` how many of the last are there already.
+    ``fixed`` how many of the last are there already; ``matches`` what a matcher could use of
+    their views, where the limits ask for it.
     """
 
     cameras: tuple[RigCamera, ...]
@@ -55,6 +57,7 @@ class Candidates:
     position_mm: Floats
     distance_mm: Floats
     fixed: int
+    matches: Matches | None = None
 
     def __len__(self) -> int:
         return len(self.cameras)
@@ -234,4 +237,5 @@ def _weighed(
     information = ray_information(state, problem.points, weight) / problem.length_mm**2
     distance = np.linalg.norm(centres - middle, axis=1)
     prior = problem.prior / problem.length_mm**2
-    return Candidates(cameras, information, seen, share, prior, centres, distance, fixed)
+    matches = Matches.of(problem, seen, share)
+    return Candidates(cameras, information, seen, share, prior, centres, distance, fixed, matches)

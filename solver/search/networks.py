@@ -112,6 +112,8 @@ class Search:
             lonely = rest[~self.near[np.ix_(rest, rest)].any(axis=1)]
             broken = broken + (~self.near[:, lonely]).sum(axis=1)
             broken = broken + ~self.near[:, rest].any(axis=1)
+        if self.candidates.matches is not None:
+            broken = broken + self.candidates.matches.broken_with_each(rest)
         return np.asarray(broken)
 
     def _shortfall_factor(self, count: Ints) -> Floats:

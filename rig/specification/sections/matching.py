@@ -8,7 +8,16 @@ from typing import Self
 from pydantic import Field
 
 from common.files.strict import StrictModel
-from solver.matching import Matching
+from solver.matching import Matching, PairTier
+
+
+class PairTierSection(StrictModel):
+    """One step of how many pairs can match a point."""
+
+    pairs: int = Field(ge=1, description="Number of pairs of cameras that can match a point.")
+    share: float = Field(
+        gt=0.0, le=1.0, description="Share that needs them, of the points that can be matched."
+    )
 
 
 class MatchingSection(StrictModel):
@@ -39,11 +48,23 @@ class MatchingSection(StrictModel):
         "cameras that are joined, directly or through others, are a group.",
     )
 
+    required: bool = Field(
+        default=Matching().required,
+        description="Whether it is a limit: all cameras are one group, and the tiers hold.",
+    )
+    tier: list[PairTierSection] = Field(
+        default_factory=list,
+        description="How many pairs points must be in. Without one: a pair for 99.5 %.",
+    )
+
     def to_matching(self) -> Matching:
         """The criteria as the solver sees them."""
-        return Matching(**self.model_dump())
+        tiers = tuple(PairTier(t.pairs, t.share) for t in self.tier) or Matching().tiers
+        return Matching(**self.model_dump(exclude={"tier"}), tiers=tiers)
 
     @classmethod
     def from_matching(cls, matching: Matching) -> Self:
         """The section that describes ``matching``."""
-        return cls(**asdict(matching))
+        plain = asdict(matching)
+        tiers = [PairTierSection(**tier) for tier in plain.pop("tiers")]
+        return cls(**plain, tier=tiers)

@@ -191,6 +191,8 @@ def test_figures_for_people() -> None:
     assert [figure_text(v) for v in (float("nan"), float("inf"), 0.0)] == ["–", "∞", "0"]
     assert percent(1.0) == "100 %" and percent(0.99999) == "99.99 %" and percent(0.5) == "50 %"
     assert family_words("base_height_mean_min")[0] == "Base/height, least mean"
+    assert family_words("coverage_2")[0] == "Coverage, 2 or more views"
+    assert family_words("matchable_1")[0] == "Matchable, 1 or more pairs"
     assert family_words("newly_invented") == ("newly invented", "")
 
 

@@ -19,7 +19,7 @@ from rig.specification.examples import example_names, example_rig, example_text
 from rig.specification.rigfile import RigFile, parse_rig, read_rig, rig_from_mapping
 from rig.specification.strategies import Strategy
 from solver.limits import Box, HalfSpace, Limits, Roll, Sphere
-from solver.matching import Matching
+from solver.matching import Matching, PairTier
 
 
 def face() -> dict[str, Any]:
@@ -150,13 +150,18 @@ SWITCHES = {
 def test_rolls_and_matching_are_read_and_written() -> None:
     absent = rig_from_mapping(face()).limits
     assert (absent.roll, absent.matching) == (Limits().roll, Limits().matching)
-    matching = {"max_angle_deg": 30.0, "max_incidence_deg": 60.0, "max_scale_ratio": 1.3}
+    assert not absent.matching.required
+    matching: dict[str, Any] = {"max_angle_deg": 30.0, "max_incidence_deg": 60.0}
+    matching |= {"max_scale_ratio": 1.3, "required": True, "tier": [{"pairs": 2, "share": 0.9}]}
     data = put(put(face(), "limits.roll", "level-or-portrait"), "matching", matching)
     spec = rig_from_mapping(data)
     assert spec.limits.roll is Roll.LEVEL_OR_PORTRAIT
-    assert spec.limits.matching == Matching(30.0, 60.0, 1.3)
+    assert spec.limits.matching == Matching(30.0, 60.0, 1.3, 0.1, True, (PairTier(2, 0.9),))
     again = RigFile.from_spec(spec).to_spec().limits
     assert (again.roll, again.matching) == (spec.limits.roll, spec.limits.matching)
+    with pytest.raises(InputError, match="22 pairs, but 7 cameras are 21") as caught:
+        rig_from_mapping(put(data, "matching.tier", [{"pairs": 22, "share": 0.9}]))
+    assert caught.value.detail == "limits-contradict"
     with pytest.raises(InputError, match=r"limits\.roll"):
         rig_from_mapping(put(face(), "limits.roll", "landscape"))
     with pytest.raises(InputError, match=r"matching\.max_angle_deg"):

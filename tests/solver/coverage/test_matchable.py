@@ -15,9 +15,11 @@ from geometry.frames import Pose
 from geometry.raycast import Occluder
 from geometry.subject import Subject
 from geometry.surface import SurfacePoints
-from solver.coverage.matchable import Matchable, MatchableViews
+from solver.coverage.matchable import Matchable, MatchableViews, lacks
+from solver.coverage.views import judge
+from solver.coverage.visibility import cast_rays
 from solver.limits import Box, HalfSpace, Limits, MotionBox, Sphere, Zones
-from solver.matching import Matching
+from solver.matching import Matching, PairTier
 from solver.problem import Problem
 from solver.quality import Observations, evaluate
 
@@ -190,3 +192,58 @@ def test_what_no_pair_could_meet_is_refused_by_its_name(name: str, value: float)
     with pytest.raises(InputError, match=f"matching.{name}") as caught:
         Matching(**{name: value})
     assert caught.value.detail == "limit-value"
+
+
+def asked(**changes: object) -> tuple[Subject, tuple[RigCamera, ...], Limits]:
+    """The network with matching as a limit that it breaks in every way."""
+    subject, cameras, limits = network()
+    tiers = (PairTier(1, 0.9), PairTier(2, 0.5))
+    strict = replace(
+        MATCHING, **({"required": True, "tiers": tiers, "least_shared": 0.5} | changes)
+    )
+    return subject, cameras, replace(limits, matching=strict)
+
+
+def test_what_is_asked_of_matching_is_judged_by_name() -> None:
+    subject, cameras, limits = asked()
+    quality = evaluate(subject, cameras, limits)
+    rows = {r.name: r for r in quality.constraints}
+    one, two, groups = rows["matchable_1/all"], rows["matchable_2/all"], rows["groups/all"]
+    assert (one.value, one.limit) == (quality.matchable.share(1), 0.9)
+    assert (two.value, two.limit) == (quality.matchable.share(2), 0.5)
+    assert (groups.value, groups.limit) == (float(len(quality.matchable.groups)), 1.0)
+    assert not (one.satisfied or two.satisfied or groups.satisfied)
+    content = asked(least_shared=1e-6, tiers=(PairTier(1, one.value),))
+    rows = {r.name: r for r in evaluate(*content).constraints}
+    assert rows["matchable_1/all"].satisfied
+    names = {r.family for r in evaluate(*asked(required=False)).constraints}
+    assert not names & {"groups", "matchable_1"}
+
+
+def test_the_solver_counts_what_lacks_as_it_is_judged() -> None:
+    subject, cameras, limits = asked()
+    # All in frame and sharp, as the solver takes them to be: other limits are for that.
+    sharp = replace(cameras[0].camera, circle_of_confusion_mm=10.0, image_size_px=(9000, 9000))
+    cameras = tuple(replace(c, camera=sharp) for c in cameras)
+    problem = Problem(subject, cameras, limits)
+    state, position = (
+        problem.unknowns.state(problem.start_values()),
+        problem.visibility_positions[0],
+    )
+    centres = np.stack([c.pose.position_rig_mm for c in cameras])
+    found = cast_rays(subject.check_points, subject.occluder, centres, 70.0, (position,))
+    quality = evaluate(subject, cameras, limits)
+    lacking = lacks(problem, state, position, found)
+    rows = {r.family: -r.slack for r in quality.violated}
+    assert lacking
+    assert lacking == {name: pytest.approx(rows[name]) for name in lacking}
+    assert lacking.keys() == rows.keys() & {"matchable_1", "matchable_2", "groups"}
+    assert judge(problem, state).shortfall >= max(lacking.values()) - 1e-12
+    off = replace(problem, limits=replace(limits, matching=MATCHING))
+    assert lacks(off, state, position, found) == {}
+
+
+@pytest.mark.parametrize(("pairs", "share"), [(0, 0.5), (1, 0.0), (1, 1.01)])
+def test_a_tier_of_pairs_that_means_nothing_is_refused(pairs: int, share: float) -> None:
+    with pytest.raises(InputError, match="matching asks for"):
+        PairTier(pairs, share)
