@@ -25,7 +25,7 @@ def wide(focal_px: float, terms: list[float]) -> Camera:
 
 
 @pytest.mark.parametrize("terms", [[-0.25, 0.06, 0.0, 0.0, -0.005], [0.0, 0.0, 0.0, 0.0, 0.0]])
-@pytest.mark.parametrize("turn_deg", [0.0, 25.0])
+@pytest.mark.parametrize("turn_deg", [pytest.param(0.0, marks=pytest.mark.slow), 25.0])
 def test_corners_of_a_plate_that_fills_a_wide_picture_are_kept(
     terms: list[float], turn_deg: float
 ) -> None:
@@ -61,7 +61,8 @@ def test_a_corner_out_of_its_place_is_still_thrown_out() -> None:
     assert plate.ids[31] not in found.ids
 
 
-@pytest.mark.parametrize("legacy", [True, pytest.param(False, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("legacy", [True, False])
 def test_a_large_plate_of_the_other_pattern_is_explained(legacy: bool) -> None:
     made = CharucoPlate("plate", 19, 18, 10.0, 7.5, "DICT_5X5_250", legacy=not legacy)
     image, _ = shot(made, wide(1500.0, [0.0] * 5), np.eye(3), 360.0)

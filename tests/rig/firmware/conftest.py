@@ -11,9 +11,13 @@ from firmware_started import started
 
 SIMAVR = pytest.param(Simulator.SIMAVR, marks=pytest.mark.needs_avr, id="simavr")
 AVR8JS = pytest.param(Simulator.AVR8JS, marks=pytest.mark.needs_node, id="avr8js")
+# Half of what quick tests of the firmware take is that node starts anew for each of them.
+AVR8JS_SLOWLY = pytest.param(
+    Simulator.AVR8JS, marks=[pytest.mark.needs_node, pytest.mark.slow], id="avr8js"
+)
 
 
-@pytest.fixture(params=[SIMAVR, AVR8JS])
+@pytest.fixture(params=[SIMAVR, AVR8JS_SLOWLY])
 def box(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[FirmwareSim]:
     """A stopped box after its start, on both simulators."""
     with started(request.param, tmp_path / "edges.log") as simulated:
@@ -34,7 +38,7 @@ def js_box(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[FirmwareS
         yield simulated
 
 
-@pytest.fixture(params=[SIMAVR, AVR8JS])
+@pytest.fixture(params=[SIMAVR, AVR8JS_SLOWLY])
 def device_url(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[str]:
     """The address of a box that runs with the wall clock, for whatever opens a serial port."""
     with started(request.param, tmp_path / "edges.log") as simulated:

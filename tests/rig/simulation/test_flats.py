@@ -55,7 +55,9 @@ def by_opencv(rig_camera: RigCamera, points_rig_mm: np.ndarray) -> np.ndarray:
     return pixels.reshape(-1, 2)
 
 
-@pytest.mark.parametrize("dictionary", ["DICT_4X4_50", "DICT_APRILTAG_36h11"])
+@pytest.mark.parametrize(
+    "dictionary", ["DICT_4X4_50", pytest.param("DICT_APRILTAG_36h11", marks=pytest.mark.slow)]
+)
 def test_marker_corners_are_found_where_they_are_projected(dictionary: str) -> None:
     places = [(-90.0, 0.0, 60.0), (70.0, 20.0, -50.0), (60.0, -30.0, 70.0), (-60.0, 10.0, -60.0)]
     facing = [(0.0, -1.0, 0.0), (0.4, -1.0, 0.2), (-0.2, -1.0, 0.3), (0.1, -1.0, -0.5)]

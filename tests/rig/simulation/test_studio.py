@@ -85,6 +85,7 @@ def shift_of(
     return np.asarray(shift)
 
 
+@pytest.mark.slow
 def test_motion_within_the_exposure_blurs(studio: Studio) -> None:
     long = replace(SHOT, exposure_us=40_000.0, start_s=-0.02, pixel_format="Mono16")
     fast = replace(studio.scene, motion=replace(MOVING, samples=8))
