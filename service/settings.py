@@ -77,6 +77,10 @@ class Settings(BaseSettings):
         Path | None,
         Field(description="Folder for the sessions; `sessions` in the data folder without it."),
     ] = None
+    session_grace_days: Annotated[
+        float,
+        Field(ge=0.0, le=3650.0, description="Days in which a removed session can be restored."),
+    ] = 7.0
     max_upload_bytes: Annotated[int, Field(ge=1, description="Largest scan that is accepted.")] = (
         512 << 20
     )

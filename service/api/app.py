@@ -25,6 +25,7 @@ from service.api import (
     picturesets,
     plans,
     reconstructions,
+    removed,
     rigs,
     rigtests,
     root,
@@ -72,7 +73,7 @@ def make_app() -> FastAPI:
     )
     resources = (
         *(root, signin, health, metrics, scans, examples, designs, exports, plans, evaluations),
-        *(rigs, captures, rigtests, sessions),
+        *(rigs, captures, rigtests, sessions, removed),
         *(targetsets, picturesets, calibrations, checks, acceptances),
         *(reconstructions, comparisons),
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Mapping
 from dataclasses import replace
+from datetime import timedelta
 from typing import Annotated, Any
 
 from anyio import CapacityLimiter
@@ -61,7 +62,12 @@ class Service:
             self.store, self.engine, limited, self.notifier, self.cancels, settings.jobs_at_once
         )
         context = WorkerContext(self.store, self.notifier, self.cancels)
-        self.rigs = StationRegistry(stations, settings.sessions_folder, context)
+        self.rigs = StationRegistry(
+            stations,
+            settings.sessions_folder,
+            context,
+            timedelta(days=settings.session_grace_days),
+        )
         self.stopping = threading.Event()
         self.imports = CapacityLimiter(_IMPORTS_AT_ONCE)
 

@@ -15,7 +15,7 @@ router = APIRouter(tags=["service"])
 
 _RESOURCES = (
     *("health", "ready", "scans", "rig-examples", "designs", "plans", "evaluations"),
-    *("rigs", "captures", "rig-tests", "sessions"),
+    *("rigs", "captures", "rig-tests", "sessions", "removed-sessions"),
     *(
         "target-sets",
         "target-set-proposals",

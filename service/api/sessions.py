@@ -42,8 +42,7 @@ class SessionList(Model):
 @router.get("/v1/sessions", response_model=SessionList)
 def list_sessions(service: ServiceDep) -> SessionList:
     """List the sessions."""
-    folders = service.rigs.session_folders()
-    return SessionList(items=[SessionSummary(name=f.name, links=_links(f.name)) for f in folders])
+    return SessionList(items=[summary(folder.name) for folder in service.rigs.session_folders()])
 
 
 @router.get("/v1/sessions/{session}", response_model=SessionFile, responses=problems(404, 422))
@@ -94,6 +93,11 @@ def read_session_archive(service: ServiceDep, session: str) -> StreamingResponse
     filed = filed_at_once(service.rigs.session_folder(session))
     files = [(f"{session}/{path}", content) for path, content in filed]
     return streamed(files, f"{session}.zip", pictures=True)
+
+
+def summary(name: str) -> SessionSummary:
+    """A session in short, by its name."""
+    return SessionSummary(name=name, links=_links(name))
 
 
 def _links(name: str) -> dict[str, str]:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import ExitStack
+from datetime import timedelta
 from pathlib import Path
 
 from common.errors import ConflictError, InputError, NotFoundError, RigwrightError
@@ -13,6 +15,7 @@ from rig.acquisition.station.stationfile import read_station
 from service.ipc import error_fields
 from service.kinds.rigs import CAPTURE, RIG_TEST, CaptureRequest
 from service.stations.jobs import capture_outcome
+from service.stations.removed import RemovedFolder, RemovedSessions
 from service.stations.worker import StationWorker, WorkerContext
 from service.store import interrupted
 from service.store.jobrecords import JobRecord
@@ -25,8 +28,15 @@ STATION_KINDS = (CAPTURE.name, RIG_TEST.name)
 class StationRegistry:
     """The workers by name. Raises :class:`InputError` when two stations have one name."""
 
-    def __init__(self, stations: Sequence[Station], sessions: Path, context: WorkerContext) -> None:
+    def __init__(
+        self,
+        stations: Sequence[Station],
+        sessions: Path,
+        context: WorkerContext,
+        grace: timedelta = timedelta(days=7),
+    ) -> None:
         self.sessions = sessions
+        self.removed = RemovedSessions(sessions, grace)
         self._context = context
         self._workers = {
             station.name: StationWorker(station, sessions, context) for station in stations
@@ -40,6 +50,7 @@ class StationRegistry:
         """Settle what a crash left, then open all stations."""
         for job in self._context.store.jobs.running(STATION_KINDS):
             self._settle(job)
+        self.removed.all()
         for worker in self._workers.values():
             worker.start()
 
@@ -75,6 +86,24 @@ class StationRegistry:
             return []
         found = (folder for folder in self.sessions.iterdir() if not folder.name.startswith("."))
         return sorted(folder for folder in found if (folder / "session.json").is_file())
+
+    def remove_session(self, name: str) -> RemovedFolder:
+        """Put a session away, out of sight of all rigs.
+
+        Raises :class:`NotFoundError`, and :class:`ConflictError` while a rig is busy or somebody
+        uses the session.
+        """
+        folder = self.session_folder(name)
+        with ExitStack() as stack:
+            for worker in self._workers.values():
+                stack.enter_context(worker.without_session(folder))
+            if self._context.store.jobs.need_session(str(folder)):
+                raise ConflictError(
+                    "session-in-use",
+                    f"a job that has not ended needs session {name!r}",
+                    "wait for it, or cancel it",
+                )
+            return self.removed.remove(folder)
 
     def _settle(self, job: JobRecord) -> None:
         """Write down how a job ended that ran when the service died: its session knows."""

@@ -10,7 +10,8 @@ from rig.acquisition.session.folder import Session
 
 
 class Sessions:
-    """Sessions under ``root``. Used by one thread, except for :meth:`folder_of`."""
+    """Sessions under ``root``. Used by one thread, except for :meth:`folder_of`; whoever
+    calls :meth:`let_go_of` keeps that thread from beginning anything."""
 
     def __init__(self, root: Path) -> None:
         self.root = root
@@ -31,6 +32,11 @@ class Sessions:
         except NotFoundError:
             self._open = rig.new_session(folder, subject, operator)
         return self._open
+
+    def let_go_of(self, folder: Path) -> None:
+        """Close that session, where it is the open one."""
+        if self._open is not None and self._open.folder == folder:
+            self.close()
 
     def close(self) -> None:
         """Let go of the open session."""

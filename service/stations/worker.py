@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import queue
 import threading
-from collections.abc import Callable
-from contextlib import suppress
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -43,6 +44,9 @@ class StationWork:
 
 _REOPEN_S = 5.0
 """How often devices are looked for that were not there: somebody plugs them in sooner or later."""
+
+_LAST_MOMENT_S = 1.0
+"""How long a thread may take to be done with a job whose end can be read already."""
 
 _GONE = (TriggerState.DISCONNECTED, TriggerState.OPENING, TriggerState.PROBING)
 
@@ -144,13 +148,26 @@ class StationWorker:
                 self._waiting.put((record, work))
             return record, fresh
 
+    @contextmanager
+    def without_session(self, folder: Path) -> Iterator[None]:
+        """Nothing is begun meanwhile, and the session is closed here.
+
+        Raises :class:`ConflictError` ``rig-busy`` while something is being done.
+        """
+        until_s = time.monotonic() + _LAST_MOMENT_S
+        doing = self._doing
+        while doing is not None and self._over(doing) and time.monotonic() < until_s:
+            time.sleep(0.01)
+            doing = self._doing
+        with self._lock:
+            if self._doing is not None:
+                raise self._busy(self._doing)
+            self._sessions.let_go_of(folder)
+            yield
+
     def _require_ready(self, kind: JobKind[Any, Any]) -> None:
         if self._doing is not None and not self._over(self._doing):
-            raise ConflictError(
-                "rig-busy",
-                f"rig {self.name!r} is busy with {self._doing.kind} {self._doing.id}",
-                "wait until it has ended, or abort it",
-            )
+            raise self._busy(self._doing)
         if self._rig is None or self._stopping.is_set():
             raise self._not_open()
         box = self._rig.health().box
@@ -167,6 +184,13 @@ class StationWorker:
             raise InterlockError(
                 "open", f"the interlock of rig {self.name!r} is open", "close it, then ask again"
             )
+
+    def _busy(self, doing: JobRecord) -> ConflictError:
+        return ConflictError(
+            "rig-busy",
+            f"rig {self.name!r} is busy with {doing.kind} {doing.id}",
+            "wait until it has ended, or abort it",
+        )
 
     def _over(self, job: JobRecord) -> bool:
         """Whether a job's end can be read already, though its thread is not quite done with it.

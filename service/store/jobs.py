@@ -165,6 +165,12 @@ class Jobs:
             lambda connection: [record_of(row) for row in connection.execute(query).mappings()]
         )
 
+    def need_session(self, session: str) -> bool:
+        """Whether a job that has not ended reads the session of that path."""
+        active = jobs.c.status.in_([JobStatus.PENDING, JobStatus.RUNNING])
+        query = select(exists().where(jobs.c.request["session"].as_string() == session, active))
+        return bool(self._database.read(lambda connection: connection.scalar(query)))
+
     def counts(self) -> dict[JobStatus, int]:
         """How many jobs are in each state."""
         query = select(jobs.c.status, func.count()).group_by(jobs.c.status)

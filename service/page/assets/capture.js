@@ -13,7 +13,7 @@ export function capturing(rig, signal) {
   const shots = h("input", { type: "number", min: 1, max: 1000, value: 1 });
   const interval = h("input", { type: "number", min: 0, max: 1000000, value: 0 });
   const countdown = h("input", { type: "number", min: 0, max: 60, value: 0 });
-  const fire = h("button", { type: "submit", class: "fire" }, "Fire");
+  const fire = h("button", { type: "submit", class: "fire hardware" }, "Fire");
   const place = h("div", { class: "result", "aria-live": "polite" });
   const others = h("p", { class: "note" });
   let own = "";
@@ -45,7 +45,8 @@ export function capturing(rig, signal) {
   }
 
   const element = h("form", { class: "capture", onsubmit: go },
-    h("div", { class: "fields" }, field("Session", session, "One folder of captures, for a subject or a day."),
+    h("p", { class: "note reader" }, "Your key may look and stop. To fire, sign in with one of scope hardware."),
+    h("div", { class: "fields hardware" }, field("Session", session, "One folder of captures, for a subject or a day."),
       field("Subject", subject, "For a new session."), field("Shots", shots), field("Between shots, ms", interval),
       field("Countdown, s", countdown)),
     fire, others, place);

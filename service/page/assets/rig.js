@@ -52,7 +52,7 @@ function panel(one, signal) {
     told,
     h("div", { class: "split" }, h("div", {}, capture.element),
       h("div", {}, devices,
-        h("div", { class: "row" }, TESTS.map(([test, words, title]) =>
+        h("div", { class: "row hardware" }, TESTS.map(([test, words, title]) =>
           h("button", { type: "button", class: "quiet", title, onclick: () => run(one, test, tested, signal) }, words)),
         h("button", { type: "button", class: "quiet", title: "Let the box leave its fault. Fires nothing.", onclick: () => act(one.links.reset) }, "Reset the box")),
         tested)));

@@ -1,6 +1,6 @@
 // Sessions: what was photographed, to look at, prove whole and take away.
 
-import { get, post } from "./api.js";
+import { get, post, remove } from "./api.js";
 import { fill, h, problem, table, when } from "./dom.js";
 import { address, sheet } from "./pictures.js";
 
@@ -19,8 +19,40 @@ async function list(root, signal) {
       : h("p", {}, items.length ? "No session has such a name." : "Nothing was captured yet. Take a capture under Rig."));
   };
   fill(root, h("h1", {}, "Sessions"),
-    items.length > 5 ? h("input", { type: "search", placeholder: "Search", "aria-label": "Search sessions", oninput: (event) => show(event.target.value) }) : null, rows);
+    items.length > 5 ? h("input", { type: "search", placeholder: "Search", "aria-label": "Search sessions", oninput: (event) => show(event.target.value) }) : null, rows, await deleted(root, signal));
   show("");
+}
+
+/** What was deleted and can still be restored. */
+async function deleted(root, signal) {
+  const { items } = await get("/v1/removed-sessions", signal);
+  if (!items.length) return null;
+  const told = h("div", { "aria-live": "polite" });
+  const act = async (work) => {
+    try {
+      await work();
+      await list(root, signal);
+    } catch (error) {
+      fill(told, problem(error));
+    }
+  };
+  return h("details", {}, h("summary", {}, `Deleted, restorable: ${items.length}`), told,
+    h("ul", { class: "list" }, items.map((item) => h("li", { class: "row" }, `${item.name}, until ${when(item.until)}`,
+      h("button", { type: "button", class: "quiet configure", "aria-label": `Restore ${item.name}`, onclick: () => act(() => post(item.links.restore)) }, "Restore"),
+      twice("Erase now", `Erase ${item.name} for good?`, "Erase for good", () => act(() => remove(item.links.self)))))));
+}
+
+/** A button that asks once more before it does anything. */
+function twice(words, question, sure, act) {
+  const place = h("span", { class: "row configure" });
+  const ask = () => {
+    const no = h("button", { type: "button", class: "quiet", onclick: begin }, "Keep it");
+    fill(place, h("span", { role: "alert" }, question), h("button", { type: "button", class: "stop", onclick: act }, sure), no);
+    no.focus();
+  };
+  const begin = () => fill(place, h("button", { type: "button", class: "quiet", onclick: ask }, words));
+  begin();
+  return place;
 }
 
 async function one(root, name, signal) {
@@ -30,7 +62,15 @@ async function one(root, name, signal) {
   const captures = session.captures.toReversed().map((entry) => capture(name, own, entry, signal));
   fill(root, h("p", {}, h("a", { href: "#/sessions" }, "All sessions")),
     h("div", { class: "heading" }, h("h1", {}, name),
-      h("button", { type: "button", class: "quiet", onclick: () => prove(own, proof) }, "Prove it whole")),
+      h("button", { type: "button", class: "quiet", onclick: () => prove(own, proof) }, "Prove it whole"),
+      twice("Delete", `Delete ${name} and its ${session.captures.length} captures? For some days it can be restored.`, "Delete it", async () => {
+        try {
+          await remove(own);
+          location.hash = "#/sessions";
+        } catch (error) {
+          fill(proof, problem(error));
+        }
+      })),
     proof,
     session.captures.length ? captures : h("p", {}, "It holds no capture."),
     h("details", {}, h("summary", {}, "Tables and rig files"),

@@ -53,6 +53,7 @@ async function who() {
     askForKey();
     return false;
   }
+  document.body.dataset.scope = scope;
   const out = async () => {
     await remove("/v1/sign-in").catch(() => {});
     askForKey();

@@ -76,6 +76,25 @@ def test_a_session_is_looked_at_and_proven(visits: tuple[Visit, Visit]) -> None:
     other.sound()
 
 
+@pytest.mark.slow
+def test_a_session_is_deleted_when_asked_twice_and_comes_back(
+    visits: tuple[Visit, Visit], address: str
+) -> None:
+    one, _ = visits
+    one.go("Sessions")
+    one.page.get_by_role("link", name="anna").click()
+    one.press("Delete")
+    one.press("Keep it")
+    assert read(f"{address}v1/removed-sessions") == {"items": []}
+    one.press("Delete")
+    one.press("Delete it")
+    one.page.get_by_text("Deleted, restorable: 1").click()
+    one.sound()
+    one.page.get_by_role("button", name="Restore anna").click()
+    one.page.get_by_role("link", name="anna").click()
+    one.see("Prove it whole")
+
+
 @pytest.mark.parametrize("view", ["Calibration", "Design", "Build"])
 def test_views_of_an_empty_service(visits: tuple[Visit, Visit], view: str) -> None:
     one, _ = visits

@@ -34,9 +34,11 @@ def test_who_has_a_key_comes_in_and_may_what_it_says(
         one.page.reload()
         one.see("anna (read)")
         one.press("Abort: all outputs off")
-        one.press("Fire")
-        one.see("this needs hardware")
-        one.faults.clear()  # the browser tells of every refusal on its console
+        one.see("Your key may look and stop.")
+        for button in ("Fire", "Self-test", "Reset the box"):
+            assert one.page.get_by_role("button", name=button, exact=True).count() == 0
+        links = one.page.get_by_role("navigation").get_by_role("link").all()
+        assert len({link.bounding_box()["y"] for link in links}) == 1  # type: ignore[index]
         one.press("Sign out")
         one.see("Your key")
         assert one.page.get_by_text("Trigger box").count() == 0
