@@ -5,7 +5,9 @@ from __future__ import annotations
 import asyncio
 import signal
 import socket
+import ssl
 from collections.abc import Callable
+from pathlib import Path
 from types import FrameType
 
 import h11
@@ -73,7 +75,8 @@ class _Server(uvicorn.Server):
         await super().startup(sockets)
         if self.started and sockets:
             host, port = sockets[0].getsockname()[:2]
-            self._ready(f"http://{f'[{host}]' if ':' in host else host}:{port}")
+            scheme = "http" if self.config.ssl is None else "https"
+            self._ready(f"{scheme}://{f'[{host}]' if ':' in host else host}:{port}")
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         self._service.announce_stop()
@@ -91,6 +94,7 @@ def serve(service: Service, app: FastAPI, ready: Callable[[str], None]) -> None:
     Raises :class:`InputError` when the address cannot be listened on.
     """
     settings = service.settings
+    tls = _certificate(settings.tls_cert, settings.tls_key)
     listening = _listen(settings.host, settings.port)
     config = uvicorn.Config(
         app,
@@ -100,8 +104,30 @@ def serve(service: Service, app: FastAPI, ready: Callable[[str], None]) -> None:
         lifespan="on",
         http=_Http,
     )
+    config.load()
+    config.ssl = tls
     with listening:
         asyncio.run(_Server(config, service, ready).serve([listening]))
+
+
+def _certificate(cert: Path | None, key: Path | None) -> ssl.SSLContext | None:
+    """What to answer over HTTPS with; None where HTTP is wanted."""
+    if cert is None and key is None:
+        return None
+    if cert is None or key is None:
+        raise InputError("tls", "a certificate goes with its key", "give --tls-cert and --tls-key")
+    context = ssl.create_default_context(ssl.Purpose.CLIENT_AUTH)
+    try:
+        # Nobody is there to type the password of a key that has one.
+        context.load_cert_chain(cert, key, password="")
+    except (OSError, ValueError) as error:
+        why = getattr(error, "reason", None) or getattr(error, "strerror", None) or error
+        raise InputError(
+            "tls",
+            f"{cert} and {key} are no certificate with its key ({why})",
+            "give PEM files that belong together, the key without a password",
+        ) from error
+    return context
 
 
 def _listen(host: str, port: int) -> socket.socket:

@@ -58,6 +58,13 @@ class Settings(BaseSettings):
             "behind a proxy, for example."
         ),
     ] = False
+    tls_cert: Annotated[
+        Path | None,
+        Field(description="Certificate (PEM, with its chain) to answer over HTTPS with."),
+    ] = None
+    tls_key: Annotated[Path | None, Field(description="Private key of the certificate (PEM).")] = (
+        None
+    )
     root_path: Annotated[
         str,
         Field(

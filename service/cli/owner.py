@@ -96,7 +96,8 @@ def served_rig(asked: Asked) -> Iterator[RigThere | None]:
         yield None
         return
     key = asked.key if found is None or found.own else None
-    service = Service(found.note.url if found else asked.server or "", key)
+    certificate = found.note.certificate if found else None
+    service = Service(found.note.url if found else asked.server or "", key, certificate)
     try:
         name = found.note.rig if found else _name(service, asked)
         sys.stderr.write(f"asking the service at {service.url}, which runs the rig {name!r}\n")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ssl
 from typing import TypeVar
 from urllib.parse import urlsplit
 
@@ -41,14 +42,20 @@ class ProblemSeen(Seen):
 
 
 class Service:
-    """A running service at ``url``, asked with a ``key`` where it wants one."""
+    """A running service at ``url``, asked with a ``key`` where it wants one.
 
-    def __init__(self, url: str, key: str | None = None) -> None:
+    ``certificate``: the file of the one it must have; without it those that the system trusts,
+    and that of ``SSL_CERT_FILE``.
+    """
+
+    def __init__(self, url: str, key: str | None = None, certificate: str | None = None) -> None:
         self.url = _base(url)
         headers = {"X-Rigwright": "1"}
         if key:
             headers["Authorization"] = f"Bearer {key}"
-        self._http = httpx2.Client(headers=headers, timeout=TIMEOUT_S, trust_env=False)
+        self._http = httpx2.Client(
+            headers=headers, timeout=TIMEOUT_S, trust_env=False, verify=_trust(certificate)
+        )
 
     def close(self) -> None:
         """Let go of the connection."""
@@ -99,6 +106,23 @@ class Service:
             f"the service at {self.url} does not answer ({why})",
             "see whether it runs, and whether --server is its address",
         )
+
+
+def _trust(certificate: str | None) -> ssl.SSLContext:
+    """Whom to believe: exactly the holder of a certificate, whatever name it is for."""
+    if certificate is None:
+        return ssl.create_default_context()
+    try:
+        context = ssl.create_default_context(cafile=certificate)
+    except OSError as error:
+        raise InputError(
+            "server",
+            f"the service's certificate {certificate} cannot be read ({error.strerror})",
+            "name the service with --server",
+        ) from error
+    context.check_hostname = False
+    context.verify_flags |= ssl.VerifyFlags.VERIFY_X509_PARTIAL_CHAIN
+    return context
 
 
 def _base(url: str) -> str:

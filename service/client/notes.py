@@ -27,11 +27,15 @@ _TRIES, _PAUSE_S = 20, 0.01
 
 
 class ServiceNote(StrictModel):
-    """What a service says of one of its rigs. ``sessions``: the folder it files captures in."""
+    """What a service says of one of its rigs.
+
+    ``sessions``: the folder it files captures in; ``certificate``: the file it proves itself with.
+    """
 
     url: str
     rig: str
     sessions: str
+    certificate: str | None = None
 
 
 @dataclass(frozen=True)
@@ -44,7 +48,11 @@ class FoundService:
 
 @contextmanager
 def noted(
-    url: str, stations: Sequence[Station], sessions: Path, folder: Path | None = None
+    url: str,
+    stations: Sequence[Station],
+    sessions: Path,
+    certificate: Path | None = None,
+    folder: Path | None = None,
 ) -> Iterator[None]:
     """Say that the service at ``url`` runs these rigs. ``folder``: where lock files lie.
 
@@ -54,7 +62,12 @@ def noted(
         for station in stations:
             if station.path is None:
                 continue
-            note = ServiceNote(url=_reachable(url), rig=station.name, sessions=str(sessions))
+            note = ServiceNote(
+                url=_reachable(url),
+                rig=station.name,
+                sessions=str(sessions),
+                certificate=None if certificate is None else str(certificate.resolve()),
+            )
             with suppress(LockHeldError, OSError):
                 lock = _taken(_note_file(station.path, folder), note.model_dump_json())
                 held.callback(lock.release)

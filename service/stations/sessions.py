@@ -10,8 +10,10 @@ from rig.acquisition.session.folder import Session
 
 
 class Sessions:
-    """Sessions under ``root``. Used by one thread, except for :meth:`folder_of`; whoever
-    calls :meth:`let_go_of` keeps that thread from beginning anything."""
+    """Sessions under ``root``. Used by one thread, except for :meth:`folder_of`.
+
+    Whoever calls :meth:`let_go_of` keeps that thread from beginning anything.
+    """
 
     def __init__(self, root: Path) -> None:
         self.root = root

@@ -164,12 +164,12 @@ class TestNotes:
     def test_a_note_ends_with_its_service(self, tmp_path: Path) -> None:
         station = read_station(write_station(tmp_path / "in"))
         assert station.path is not None
-        with noted("http://0.0.0.0:81/lab", [station], tmp_path, tmp_path):
+        with noted("http://0.0.0.0:81/lab", [station], tmp_path, folder=tmp_path):
             found = find_service(station.path, tmp_path)
             assert found is not None and found.own
             assert (found.note.url, found.note.rig) == ("http://127.0.0.1:81/lab", "studio")
             # A second service with this station says nothing, and takes nothing away.
-            with noted("http://127.0.0.1:82", [station], tmp_path, tmp_path):
+            with noted("http://127.0.0.1:82", [station], tmp_path, folder=tmp_path):
                 assert find_service(station.path, tmp_path) == found
         assert find_service(station.path, tmp_path) is None
 

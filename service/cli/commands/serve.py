@@ -34,6 +34,16 @@ def serve(
             show_default=False,
         ),
     ] = None,
+    tls_cert: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="CERT.pem", help="Answer over HTTPS with this certificate.", show_default=False
+        ),
+    ] = None,
+    tls_key: Annotated[
+        Path | None,
+        typer.Option(metavar="KEY.pem", help="The certificate's private key.", show_default=False),
+    ] = None,
     station: Annotated[
         list[Path] | None,
         typer.Option(
@@ -47,7 +57,15 @@ def serve(
 
     Example:  rigwright serve --port 8000 --data rigwright-data --station station.toml
     """
-    run_serve_command(host=host, port=port, data_dir=data, stations=station, root_path=root_path)
+    run_serve_command(
+        host=host,
+        port=port,
+        data_dir=data,
+        stations=station,
+        root_path=root_path,
+        tls_cert=tls_cert,
+        tls_key=tls_key,
+    )
 
 
 def run_serve_command(**given: object) -> None:
@@ -72,7 +90,7 @@ def run_serve_command(**given: object) -> None:
 
         def ready(url: str) -> None:
             at = f"{url}{settings.root_path}"
-            stack.enter_context(noted(at, stations, settings.sessions_folder))
+            stack.enter_context(noted(at, stations, settings.sessions_folder, settings.tls_cert))
             _say_where(url)
 
         serve(service, create_app(service), ready)
