@@ -2,6 +2,7 @@
 
 import { all, get, post } from "./api.js";
 import { choice, field, figures, fill, frame, h, number, percent, problem, table } from "./dom.js";
+import { asking } from "./asking.js";
 import { watch } from "./job.js";
 import { completed, files, jobs } from "./joblist.js";
 
@@ -29,21 +30,6 @@ async function overview(root, signal) {
     h("section", { class: "card" }, h("h2", {}, "Targets to print"), targetsForm(designs), h("ul", { class: "list" }, targets.map((set) => sheets(set, signal)))),
     h("h2", {}, "Checks"), await jobs("/v1/checks", "calibration/checks", (job) => (job.result ? `${job.result.light}: ${job.result.text.slice(0, 90)}` : "Check"), signal),
     h("h2", {}, "Calibrations"), await jobs("/v1/calibrations", "calibration/calibrations", (job) => (job.result ? `${job.result.cameras.length} cameras, ${number(job.result.rms_px)} px` : "Calibration"), signal));
-}
-
-/** A form whose button asks for something and then goes there. */
-function asking(title, words, inputs, lacking, ask) {
-  const said = h("div", {});
-  const go = async (event) => {
-    event.preventDefault();
-    try {
-      location.hash = await ask();
-    } catch (error) {
-      fill(said, problem(error));
-    }
-  };
-  return h("form", { class: "card", onsubmit: go }, h("h2", {}, title),
-    lacking ? h("p", {}, lacking) : [h("div", { class: "fields" }, inputs), h("button", { type: "submit", class: "main" }, words), said]);
 }
 
 function source(value) {

@@ -8,8 +8,9 @@ import { calibration } from "./calibration.js";
 import { design } from "./design.js";
 import { rig } from "./rig.js";
 import { sessions } from "./sessions.js";
+import { surface } from "./surface.js";
 
-const VIEWS = { rig, sessions, calibration, design, build };
+const VIEWS = { rig, sessions, calibration, surface, design, build };
 let leave = new AbortController();
 let asking = false;
 

@@ -6,11 +6,17 @@ import json
 import urllib.request
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 from browsers import chromium
 from page_visits import Visit, served
 from stations import write_station
+
+from service.api.reconstructions import ReconstructionBody
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Route
 
 pytestmark = pytest.mark.needs_browser
 NAME = '<img src=x onerror="document.title=1">'
@@ -95,7 +101,37 @@ def test_a_session_is_deleted_when_asked_twice_and_comes_back(
     one.see("Prove it whole")
 
 
-@pytest.mark.parametrize("view", ["Calibration", "Design", "Build"])
+@pytest.mark.slow
+def test_a_surface_is_asked_for_with_what_was_chosen(visits: tuple[Visit, Visit]) -> None:
+    """Of the session that is there, with a design that only the browser is told of."""
+    one, _ = visits
+    design = {"id": "d1", "status": "completed", "created_at": "2026-01-31T12:00:00Z"}
+    listed = {"items": [design | {"result": {"name": "Seven"}}], "next": None}
+    refused = {"type": "/problems/conflict/queue-full", "detail": "too many wait; ask later"}
+    bodies: list[str] = []
+
+    def ask(route: Route) -> None:
+        if route.request.method == "GET":
+            route.continue_()
+            return
+        bodies.append(str(route.request.post_data))
+        route.fulfill(status=503, json=refused)
+
+    one.page.route("**/v1/designs?*", lambda route: route.fulfill(json=listed))
+    one.page.route("**/v1/reconstructions", ask)
+    one.go("Surface")
+    one.page.get_by_label("Capture", exact=True).locator("option").first.wait_for(state="attached")
+    one.sound()
+    one.press("Reconstruct")
+    one.see("too many wait")
+    one.page.unroute_all()
+    one.faults.clear()  # the browser tells of the refusal on its console
+    (asked,) = [ReconstructionBody.model_validate_json(body) for body in bodies]
+    assert (asked.design_id, asked.calibration_id, asked.pictures.session) == ("d1", None, "anna")
+    assert len(asked.pictures.captures) == 1
+
+
+@pytest.mark.parametrize("view", ["Calibration", "Surface", "Design", "Build"])
 def test_views_of_an_empty_service(visits: tuple[Visit, Visit], view: str) -> None:
     one, _ = visits
     one.go(view)
