@@ -142,6 +142,11 @@ class Settings(BaseSettings):
         """Where sessions are photographed into."""
         return self.sessions_dir or self.data_dir / "sessions"
 
+    @property
+    def units_dir(self) -> Path:
+        """Where finished designs of studies are kept; nothing is lost where it is emptied."""
+        return self.data_dir / "units"
+
 
 def _this_machine_only(host: str) -> bool:
     if host == "localhost":

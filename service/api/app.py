@@ -32,6 +32,7 @@ from service.api import (
     scans,
     sessions,
     signin,
+    studies,
     targetsets,
 )
 from service.api.addresses import Prefix
@@ -72,7 +73,8 @@ def make_app() -> FastAPI:
         generate_unique_id_function=lambda route: route.name,
     )
     resources = (
-        *(root, signin, health, metrics, scans, examples, designs, exports, plans, evaluations),
+        *(root, signin, health, metrics, scans, examples, designs, exports, studies),
+        *(plans, evaluations),
         *(rigs, captures, rigtests, sessions, removed),
         *(targetsets, picturesets, calibrations, checks, acceptances),
         *(reconstructions, comparisons),

@@ -14,7 +14,8 @@ from service.kinds.base import Model
 router = APIRouter(tags=["service"])
 
 _RESOURCES = (
-    *("health", "ready", "scans", "rig-examples", "designs", "plans", "evaluations"),
+    *("health", "ready", "scans", "rig-examples", "designs", "studies"),
+    *("plans", "evaluations"),
     *("rigs", "captures", "rig-tests", "sessions", "removed-sessions"),
     *(
         "target-sets",

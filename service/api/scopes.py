@@ -11,7 +11,7 @@ OPEN = frozenset({"sign_in", "read_sign_in", "openapi", "read_page", "read_asset
 
 _STOPS = (
     *("abort_rig", "cancel_capture", "cancel_rig_test"),
-    *("cancel_design", "cancel_plan", "cancel_evaluation"),
+    *("cancel_design", "cancel_study", "cancel_plan", "cancel_evaluation"),
     *("cancel_calibration", "cancel_check", "cancel_acceptance"),
     *("cancel_reconstruction", "cancel_comparison"),
 )
@@ -21,6 +21,7 @@ _READS = (*_STOPS, "verify_session_files", "sign_out")
 _CONFIGURES = (
     *("add_scan", "remove_scan", "add_target_set", "propose_target_set", "remove_target_set"),
     *("add_picture_set", "remove_picture_set", "add_design", "remove_design"),
+    *("add_study", "remove_study"),
     *("add_plan", "remove_plan", "add_evaluation", "remove_evaluation"),
     *("add_calibration", "remove_calibration", "add_check", "remove_check"),
     *("add_acceptance", "remove_acceptance", "remove_capture", "remove_rig_test"),

@@ -27,6 +27,11 @@ def body_examples() -> Mapping[str, Any]:
     pictures = {"session": "monday"}
     return {
         "add_design": {"scan_id": _SCAN, "rig": rig, "cameras": 7},
+        "add_study": {
+            "study": {"name": "How many?", "starts": 2, "grid": {"cameras": [4, 5, 6]}},
+            "rigs": [rig],
+            "scan_ids": [_SCAN],
+        },
         "add_evaluation": {"scan_id": _SCAN, "rig": rig, "design": network},
         "add_plan": {"design_id": _DESIGN, "mount": {"kind": "t-slot"}},
         "add_target_set": {key: targets[key] for key in ("schema", "name", "plates")},

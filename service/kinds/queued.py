@@ -14,9 +14,10 @@ from service.kinds.design import DESIGN
 from service.kinds.evaluation import EVALUATION
 from service.kinds.plan import PLAN
 from service.kinds.reconstruction import RECONSTRUCTION
+from service.kinds.study import STUDY
 
 _ALL: tuple[JobKind[Any, Any], ...] = (
-    *(DESIGN, EVALUATION, PLAN),
+    *(DESIGN, STUDY, EVALUATION, PLAN),
     *(CALIBRATION, CHECK, ACCEPTANCE),
     *(RECONSTRUCTION, COMPARISON),
 )

@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Self
 
 from pydantic import Field
 
+from common.errors import InputError
 from rig.specification.rigfile import RigFile
+from rig.study.grid import choices, rig_of
+from rig.study.heads import ROLE
 from rig.study.studyfile import Study
 from service.kinds.base import Figure, JobKind, Request, Result
+from service.kinds.scanned import rig_for_scan
+
+_TRIED = 200
+"""Designs that are looked at before a study is taken; those after it are looked at in the job."""
 
 
 class StudyRequest(Request):
@@ -27,6 +35,30 @@ class StudyRequest(Request):
             description="What to call the scans, in their order.",
         ),
     ]
+
+    def for_scans(self, names: Sequence[str], options: Mapping[str, str | float]) -> Self:
+        """The same for scans, read with their own ``options`` where a rig has none."""
+        rigs = [rig_for_scan(rig, options) for rig in self.rigs]
+        return self.model_copy(update={"rigs": rigs, "head_names": self.head_names or list(names)})
+
+    def check(self) -> None:
+        """Refuse what can be seen to be wrong within a second.
+
+        Raises :class:`~common.errors.InputError` for a grid that is too large and where its first
+        designs cannot be, :class:`~common.errors.NotFoundError` for lenses that are not there.
+        """
+        rigs = [str(number) for number in range(len(self.rigs))]
+        asked = choices(self.study, rigs, ["a head"])[:_TRIED]
+        refused = None
+        for choice in asked:
+            try:
+                rig_of(choice, self.rigs[int(choice.rig)], self.study)
+            except InputError as error:
+                refused = refused or error
+            else:
+                return
+        if refused is not None and len(asked) < _TRIED:
+            raise refused
 
 
 class Recommended(Result):
@@ -55,3 +87,8 @@ class StudyResult(Result):
 
 
 STUDY = JobKind("study", StudyRequest, StudyResult)
+
+
+def head_role(number: int) -> str:
+    """What the scan of this number, from 1, is called among the inputs."""
+    return ROLE.format(number)

@@ -146,7 +146,7 @@ def test_the_examples_fit_their_schemas() -> None:
 
 def test_streams_name_their_events() -> None:
     followed = [o for path, _, o in operations() if path.endswith("/events")]
-    assert len(followed) == 10
+    assert len(followed) == 11
     for operation in followed:
         events = operation["responses"]["200"]["content"]["text/event-stream"]["itemSchema"]
         assert events["properties"]["event"]["enum"] == list(EVENTS)

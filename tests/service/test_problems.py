@@ -200,6 +200,7 @@ LIKE_DESIGNS = tuple(
     for name in (
         "captures",
         "rig-tests",
+        "studies",
         "evaluations",
         "plans",
         "calibrations",
