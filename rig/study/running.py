@@ -21,7 +21,7 @@ from contextlib import AbstractContextManager, contextmanager
 from multiprocessing.synchronize import Event
 from pathlib import Path
 
-from common.errors import CancelledError
+from common.errors import CancelledError, RigwrightError
 from common.processes import end_with_parent, single_threaded_children
 from common.progress import CancelToken, NeverCancelled, Progress, ProgressCallback
 from rig.study.cache import UnitCache
@@ -34,6 +34,11 @@ _DIED = "the process that computed it died, twice; see how much memory it needs"
 Files = Mapping[str, Path]
 OpenExecutor = Callable[[CancelToken], AbstractContextManager[Executor]]
 """Opens who computes units; units still computed when ``cancel`` is set end soon."""
+
+
+class UnitLostError(Exception):
+    """Whoever computed a unit died of it, again and again; the others go on."""
+
 
 _cancelled: CancelToken = NeverCancelled()
 
@@ -156,14 +161,26 @@ class StudyRun:
         number = self._flying[future]
         try:
             result = future.result()
-        except (BrokenExecutor, CancelledError):
+        except (BrokenExecutor, RigwrightError):
             raise
+        except UnitLostError:
+            del self._flying[future]
+            self._keep_row(number, _DIED)
+            return
         except Exception as error:  # noqa: BLE001 - a fault in one unit must not end the others
             result = fault_of(self._units[number], error)
         else:
-            self._cache.put(result)
+            result = self._checked(number, result)
         del self._flying[future]
         self._done(result)
+
+    def _checked(self, number: int, result: UnitResult) -> UnitResult:
+        """The result, kept; a worker's with another program is not what was asked for."""
+        if result.key == self._keys[number]:
+            self._cache.put(result)
+            return result
+        reason = "the worker runs another state of the program; install the same there"
+        return UnitResult(key=self._keys[number], reason=reason, designed_for=result.designed_for)
 
     def _keep_row(self, number: int, reason: str) -> None:
         unit = self._units[number]

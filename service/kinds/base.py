@@ -54,6 +54,7 @@ class RunContext(Model):
     ``made_utc``: when it was asked for, ISO 8601. ``reference``: what a calibration is called.
     ``session`` and its ``captures`` (all without any), or the folder ``pictures``: where pictures
     are that come as no input file. ``cache``: a folder where finished parts are found and kept.
+    ``cluster``: the address of who computes them, instead of processes of this machine.
     """
 
     workers: int = 1
@@ -64,6 +65,7 @@ class RunContext(Model):
     captures: list[str] = Field(default_factory=list)
     pictures: str | None = None
     cache: str | None = None
+    cluster: str | None = None
 
 
 RequestT = TypeVar("RequestT", bound=Request)

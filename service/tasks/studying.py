@@ -11,6 +11,7 @@ from common.progress import Progress, within
 from rig.specification.rigfile import RigFile
 from rig.study.assembling import row_of, study_result, write_study
 from rig.study.cache import UnitCache
+from rig.study.cluster import AT_ONCE, cluster
 from rig.study.findings import usable
 from rig.study.grid import Choice, choices, rig_of
 from rig.study.heads import heads_of, study_identity
@@ -47,8 +48,11 @@ def study(task: Task[StudyRequest, StudyResult], running: Running) -> StudyResul
     units = [p.unit for p in planned if p.unit is not None]
     cache = UnitCache(Path(task.run.cache) if task.run.cache else task.folder / UNITS)
     run = StudyRun(units, files, cache, within(running.report, 0.0, _RUNNING))
-    workers = max(1, task.run.workers)
-    done = run.results(processes(workers), workers, running.cancel)
+    if task.run.cluster:
+        done = run.results(cluster(task.run.cluster), AT_ONCE, running.cancel)
+    else:
+        workers = max(1, task.run.workers)
+        done = run.results(processes(workers), workers, running.cancel)
     running.report(Progress("comparing", _RUNNING))
     rows = _rows(planned, done, request)
     names = list(dict.fromkeys(p.choice.rig for p in planned))

@@ -24,6 +24,14 @@ def study(
     ],
     out: OutOption,
     workers: WorkersOption = None,
+    dask: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS",
+            help="Compute on the workers of a Dask scheduler (tcp://host:port); extra 'dask'.",
+            show_default=False,
+        ),
+    ] = None,
     as_json: JsonOption = False,
     force: ForceOption = False,
 ) -> None:
@@ -60,7 +68,8 @@ def study(
             identity = study_identity(request.study, request.rigs, heads)
             return identity_in(out / "study.json") in (None, identity)
 
-        run = RunContext(workers=processes(workers), cache=str((out / UNITS).resolve()))
+        kept = str((out / UNITS).resolve())
+        run = RunContext(workers=processes(workers), cache=kept, cluster=dask)
         with grown_folder(out, UNITS, force=force, spare=[plan], same=same) as folder:
             request, inputs = asked()
             result = run_task(STUDY, request, inputs, folder, run)
