@@ -118,11 +118,11 @@ def late(random: Random) -> Case:
 
 
 def backwards(random: Random) -> Case:
-    """A folder in the opposite order, which one frame alone cannot tell from a late one."""
+    """A folder in the opposite order."""
     places, camera = check_scene().places[1], _one(random)
     other = {(camera, f): places[len(places) - 1 - f] for f in range(len(places))}
     scene = replace(check_scene(), seen_otherwise=other)
-    return Case(observed(scene, random), Kind.UNSYNCHRONISED, "")
+    return Case(observed(scene, random), Kind.UNSYNCHRONISED, "opposite order")
 
 
 def folders(random: Random) -> Case:

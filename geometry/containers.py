@@ -12,7 +12,14 @@ from typing import IO, Any
 from urllib.parse import unquote
 
 from common.errors import InputError, TooLargeError
-from geometry.scanlimits import MAX_FILE_BYTES, check_counts, format_error
+from geometry.scanlimits import (
+    GROWTH_FREE_BYTES,
+    MAX_FILE_BYTES,
+    MAX_GROWTH,
+    MAX_SHARED_POINTS,
+    check_counts,
+    format_error,
+)
 
 _GLB_HEADER_BYTES = 20
 _TRIANGLES = 4
@@ -94,9 +101,14 @@ def check_threemf(path: Path) -> None:
     try:
         with zipfile.ZipFile(path) as archive:
             entries = archive.infolist()
-            if sum(entry.file_size for entry in entries) > MAX_FILE_BYTES:
+            unpacked = sum(entry.file_size for entry in entries)
+            if unpacked > MAX_FILE_BYTES:
                 problem = "the 3MF file unpacks to more than 1 GiB"
                 raise TooLargeError("scan-file-size", problem, "decimate the scan first")
+            if unpacked > max(GROWTH_FREE_BYTES, MAX_GROWTH * path.stat().st_size):
+                times = unpacked // path.stat().st_size
+                problem = f"the 3MF file unpacks to {times} times its size, which no scan does"
+                raise TooLargeError("scan-growth", problem, "export the scan again")
             models = [e for e in entries if e.filename.lower().endswith(".model")]
             if not models:
                 problem = "the file is a ZIP archive without a 3D model, not 3MF"
@@ -116,7 +128,11 @@ def _check_models(archive: zipfile.ZipFile, models: list[zipfile.ZipInfo]) -> No
             faces += chunk.count(b"<triangle ")
             points += chunk.count(b"<vertex ")
             placements += chunk.count(b"<component ")
-    check_counts(faces, points)
+            # While unpacking: what is too large already need not be unpacked to its end.
+            check_counts(faces, 0)
+            if points > MAX_SHARED_POINTS:
+                problem = f"the scan has more than {MAX_SHARED_POINTS:,} vertices"
+                raise TooLargeError("scan-points", problem, "decimate it, 200,000 faces are plenty")
     if placements:
         for model in models:
             with archive.open(model) as file:

@@ -14,6 +14,16 @@ MAX_POINTS = 15_000_000
 """Most vertices of a file: three for each face, as in formats that do not share vertices."""
 
 
+MAX_SHARED_POINTS = 3_000_000
+"""Most vertices of a 3MF, whose faces share them: a closed mesh has half as many as faces."""
+
+MAX_GROWTH = 100
+"""How many times its own size an archive may unpack to; meshes as text unpack to some ten times."""
+
+GROWTH_FREE_BYTES = 1 << 26
+"""What an archive may unpack to whatever its own size."""
+
+
 def check_counts(faces: int, points: int) -> None:
     """Raise :class:`TooLargeError` for more faces or points than are accepted."""
     for count, limit, what in ((faces, MAX_FACES, "faces"), (points, MAX_POINTS, "points")):

@@ -81,16 +81,26 @@ def mirrored(camera: str) -> str:
 
 def out_of_step(camera: str, frames: int) -> str:
     """A camera's pictures belong to other frames."""
-    when = "late" if frames > 0 else "early"
-    count = "one frame" if abs(frames) == 1 else f"{abs(frames)} frames"
     return (
-        f"The pictures of camera {camera} are {count} {when}: pair them with the frames they "
-        "belong to, then check again."
+        f"The pictures of camera {camera} are {_frames_away(frames)}: pair them with the frames "
+        "they belong to, then check again."
     )
 
 
-def reversed_frames(camera: str) -> str:
-    """A camera's pictures are in the opposite order."""
+def _frames_away(frames: int) -> str:
+    when = "late" if frames > 0 else "early"
+    count = "one frame" if abs(frames) == 1 else f"{abs(frames)} frames"
+    return f"{count} {when}"
+
+
+def reversed_frames(camera: str, frames: int | None = None) -> str:
+    """A camera's pictures are in the opposite order, or it may be as many ``frames`` away."""
+    if frames is not None:
+        return (
+            f"The pictures of camera {camera} are in the opposite order to those of the others, or "
+            f"{_frames_away(frames)}, which too few frames show: pair them with the frames they "
+            "belong to, then check again."
+        )
     return (
         f"The pictures of camera {camera} are in the opposite order to those of the others: sort "
         "them, then check again."

@@ -27,6 +27,9 @@ FLAT_SHARE = 0.08
 """What a turn of the picture may leave, as a share of what it extends over."""
 
 FRAMES = (1, -1, 2, -2)
+AS_MANY = 0.9
+"""Two orders that explain as many points as this share of the best cannot be told apart."""
+
 GAIN = 0.2
 """Pictures belong to other frames when they fit there by this much better."""
 
@@ -115,21 +118,24 @@ def _other_frames(
     last = int(epoch.place_frame.max())
     tried = {f"{d}": frame - d for d in FRAMES}
     tried["back"] = last - frame
-    best: tuple[float, str] | None = None
+    fits: list[tuple[int, float, str]] = []
     for word, other in tried.items():
         there = _seen_in(epoch, found, moving, other, sure)
         if len(there.rows) >= max(LEAST_POINTS, len(moving) // 4):
             now = float(np.median(misfit[there.rows]))
             ratio = float(np.median(there.misfit_px)) / max(now, 1e-9)
-            if ratio < GAIN and (best is None or ratio < best[0]):
-                best = ratio, word
-    if best is None:
+            if ratio < GAIN:
+                fits.append((int((there.misfit_px < STRANGE_PX).sum()), -ratio, word))
+    if not fits:
         return None
-    word = best[1]
-    back = word == "back"
-    sentence = messages.reversed_frames(name) if back else messages.out_of_step(name, int(word))
+    # What explains most: in a folder of few frames another order fits some of them by chance.
+    most, _, word = max(fits)
+    shifts = [w for n, _, w in fits if w != "back" and n >= AS_MANY * most]
+    if any(w == "back" and n >= AS_MANY * most for n, _, w in fits):
+        sentence = messages.reversed_frames(name, int(shifts[0]) if shifts else None)
+        return Finding(Kind.UNSYNCHRONISED, (name,), sentence, value=float("nan"))
     return Finding(
-        Kind.UNSYNCHRONISED, (name,), sentence, value=float("nan") if back else int(word)
+        Kind.UNSYNCHRONISED, (name,), messages.out_of_step(name, int(word)), value=int(word)
     )
 
 

@@ -271,6 +271,29 @@ def test_a_three_mf_that_unpacks_to_too_much_is_refused(tmp_path: Path) -> None:
     assert rejected(path).detail == "scan-faces"
 
 
+def test_a_small_three_mf_that_unpacks_to_very_much_is_refused_unread(tmp_path: Path) -> None:
+    path = tmp_path / "blank.3mf"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("3D/3dmodel.model", b"<model>" + b" " * (80 << 20))
+    error = rejected(path)
+    assert isinstance(error, TooLargeError)
+    assert error.detail == "scan-growth"
+
+
+def test_a_three_mf_of_too_many_vertices_is_not_unpacked_to_its_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("geometry.containers.MAX_SHARED_POINTS", 1000)
+    path = tmp_path / "many.3mf"
+    # Beyond the limit the archive is broken, which nobody comes to see.
+    vertices = b'<vertex x="0" y="0" z="0"/>' * 2000
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("3D/3dmodel.model", vertices + bytes(8 << 20) + b"<!DOCTYPE")
+    error = rejected(path)
+    assert isinstance(error, TooLargeError)
+    assert (error.detail, "1,000 vertices" in error.problem) == ("scan-points", True)
+
+
 @pytest.mark.parametrize(
     "uri",
     ["../secret.bin", "/etc/passwd", "http://example.com/a.bin", "a/%2e%2e/../b.bin", "C:\\x.bin"],
