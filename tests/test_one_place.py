@@ -46,6 +46,7 @@ OWN_TERMS: set[str] = set()
 OPENCV = {
     "calibration/adjustment/initialisation/resection.py",
     "calibration/detection/opencv.py",
+    "evaluation/reconstruction/agreement.py",
     "evaluation/reconstruction/depthmaps.py",
     "evaluation/reconstruction/stereo.py",
     "evaluation/reconstruction/views.py",

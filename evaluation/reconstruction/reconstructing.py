@@ -6,12 +6,13 @@
 4. Patches on full-size pictures (:mod:`.depthmaps`).
 5. Fusion: agreement between cameras, mean along the normal (:mod:`.fusion`).
 6. Points that stand off their neighbours' surface go (:mod:`.neighbours`).
+7. Each picture is asked whether it shows the surface where it should (:mod:`.agreement`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from common.progress import (
     ProgressCallback,
     ignore_progress,
 )
+from evaluation.reconstruction.agreement import Doubt, doubts, pair_agreement
 from evaluation.reconstruction.cloud import Cloud
 from evaluation.reconstruction.depthmaps import (
     DepthMap,
@@ -81,11 +83,15 @@ class CameraShare:
 
 @dataclass(frozen=True, eq=False)
 class Reconstruction:
-    """A cloud, the volume it was looked for in, and what each camera gave to it."""
+    """A cloud, the volume it was looked for in, and what each camera gave to it.
+
+    ``doubts``: the cameras whose picture the others speak against.
+    """
 
     cloud: Cloud
     volume: Volume
     cameras: tuple[CameraShare, ...]
+    doubts: tuple[Doubt, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,7 +152,16 @@ def _reconstructed(
         report.step("fusion", k, count)
         parts.append(_inside(fused(fulls, k), network.volume))
     report.step("surface", 0, 1)
-    return _result(network, fulls, parts, tried, options)
+    return replace(_result(network, fulls, parts, tried, options), doubts=_doubts(network, fulls))
+
+
+def _doubts(network: _Network, maps: Sequence[DepthMap]) -> tuple[Doubt, ...]:
+    pairs = [
+        pair_agreement(maps, k, other, network.full[other])
+        for k in range(len(maps))
+        for other in network.companions[k]
+    ]
+    return doubts([p for p in pairs if p is not None], [v.name for v in network.full])
 
 
 class _Reporter:

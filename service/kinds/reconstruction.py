@@ -40,6 +40,14 @@ class CameraPart(Result):
     points: Annotated[int, Field(description="Points left when all cameras were heard.")]
 
 
+class DoubtPart(Result):
+    """What speaks against the picture of one camera."""
+
+    camera: str
+    kind: Annotated[str, Field(description="moved, foreign, blurred or dark.")]
+    words: str
+
+
 class ReconstructionResult(Result):
     """What was found, in short; ``cloud.ply`` holds the points, ``mesh.ply`` the surface."""
 
@@ -55,6 +63,9 @@ class ReconstructionResult(Result):
     without_pictures: Annotated[
         list[str], Field(description="Cameras of the rig that have no picture of this instant.")
     ]
+    doubts: Annotated[
+        tuple[DoubtPart, ...], Field(description="Cameras that the others speak against.")
+    ] = ()
 
 
 RECONSTRUCTION = JobKind("reconstruction", ReconstructionRequest, ReconstructionResult)

@@ -27,7 +27,12 @@ from evaluation.report.pages import reconstruction_page
 from geometry.camera import RigCamera
 from rig.design.designfile import read_design
 from service.jobs.engine import Running, Task
-from service.kinds.reconstruction import CameraPart, ReconstructionRequest, ReconstructionResult
+from service.kinds.reconstruction import (
+    CameraPart,
+    DoubtPart,
+    ReconstructionRequest,
+    ReconstructionResult,
+)
 from service.pictures.listing import Picture
 from service.tasks.seeing import taken_pictures
 
@@ -67,6 +72,7 @@ def reconstruction(
     running.report(Progress("drawing", 0.97))
     title = task.request.name or f"Reconstruction of {frame}"
     notes = [f"No picture of {', '.join(missing)}."] if missing else []
+    notes += [doubt.words for doubt in done.doubts]
     page = reconstruction_page(done, _shown(mesh, done, options.workers), title, notes)
     (task.folder / "report.html").write_text(page, encoding="utf-8")
     running.report(Progress("done", 1.0))
@@ -140,4 +146,5 @@ def _result(
         mesh_faces=len(mesh.faces),
         mesh_area_mm2=round(mesh.area_mm2(), 1),
         without_pictures=missing,
+        doubts=tuple(DoubtPart(camera=d.camera, kind=d.kind, words=d.words) for d in done.doubts),
     )

@@ -24,6 +24,8 @@ def print_reconstruction(result: ReconstructionResult) -> None:
         f"in {result.mesh_faces:,} triangles; cameras without a picture: {missing}",
         markup=False,
     )
+    for doubt in result.doubts:
+        console.print(doubt.words, markup=False)
 
 
 def print_comparison(result: ComparisonResult) -> None:
