@@ -135,6 +135,7 @@ def candidates(
     forbids are left out. Raises :class:`CancelledError` soon after ``cancel`` is set.
     """
     middle = subject.design_points.centroid_mm
+    closely = outward is not None
     if outward is None:
         outward = directions(_facing(subject), step_deg)
     far = limits.stand_off.max_mm or 10.0 * subject.design_points.radius_mm
@@ -153,6 +154,12 @@ def candidates(
         often += sees
         seen_mm = subject.check_points.points_mm[sees]
         pose = _pose(camera, limits, seen_mm, direction, middle)
+        if closely:
+            # From another distance other points are seen; a solve is to begin inside the limits.
+            eye = pose.position_rig_mm[None]
+            sees |= _sight(subject.check_points, subject, limits, eye, NEAR.framed_deg)[0]
+            seen_mm = subject.check_points.points_mm[sees]
+            pose = _pose(camera, limits, seen_mm, direction, middle)
         found.append(camera_at(camera, f"at{len(found)}", pose, seen_mm))
     found = _where_allowed(subject, limits, found)
     chosen, share = _weighed_points(often)

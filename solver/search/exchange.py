@@ -16,13 +16,13 @@ from solver.limits import Limits
 from solver.search.candidates import Candidates, candidates, directions_about
 from solver.search.networks import Search
 
-SHAKES = 50
+SHAKES = 80
 """Shakes of a network of the whole grid; more find hardly anything better on a head."""
 
 FINER_DEG = (2.0, 0.8)
 """Steps of the rings of candidates about the best networks so far, one look after the other."""
 
-FINER_SHAKES = 20
+FINER_SHAKES = 30
 _TAKEN_OUT = 3
 _BEST_OF = 12
 _KEPT = 4

@@ -103,6 +103,17 @@ def test_directions_are_evenly_spread_about_the_facing_side() -> None:
     assert (nearest < 1.05 * STEP_DEG).all()
 
 
+def test_a_candidate_looked_at_closely_stands_where_all_that_it_sees_from_there_is_sharp() -> None:
+    # So near a stand-off limit is off: what is seen changes with the distance.
+    limits = replace(LIMITS, coverage=Coverage(), stand_off=StandOff(None, None))
+    outward = directions(np.array([0.0, -1.0, 0.0]), 30.0)
+    found = candidates(rigs.face(60, 400), rigs.compact_camera(), limits, outward=outward)
+    assert len(found) > 5
+    for camera in found.cameras:
+        quality = evaluate(rigs.face(60, 400), (camera,), limits)
+        assert quality.feasible, quality.violated
+
+
 def test_finer_directions_lie_in_two_rings_about_the_given_ones() -> None:
     given = np.array([[0.6, -0.8, 0.0], [0.0, 0.0, 1.0]])
     found = directions_about(given, 3.0).reshape(2, 13, 3)
