@@ -106,7 +106,8 @@ def test_directions_are_evenly_spread_about_the_facing_side() -> None:
 def test_a_candidate_looked_at_closely_stands_where_all_that_it_sees_from_there_is_sharp() -> None:
     # So near a stand-off limit is off: what is seen changes with the distance.
     limits = replace(LIMITS, coverage=Coverage(), stand_off=StandOff(None, None))
-    outward = directions(np.array([0.0, -1.0, 0.0]), 30.0)
+    aside = np.array([0.5, -0.8, 0.1]) / np.sqrt(0.9)
+    outward = directions(aside, 30.0)
     found = candidates(rigs.face(60, 400), rigs.compact_camera(), limits, outward=outward)
     assert len(found) > 5
     for camera in found.cameras:
