@@ -11,7 +11,7 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 from synthetic_scenes import Scene, face_rig, stand
 
-from calibration.adjustment.camera import CalibratedCamera, Interior
+from calibration.adjustment.camera import INTERIOR, PER_CAMERA, CalibratedCamera, Interior
 from calibration.adjustment.initialisation.finding import find_start
 from calibration.adjustment.initialisation.resection import RigidTransform
 from calibration.adjustment.levenberg import LossOptions, Solution, adjust
@@ -62,8 +62,8 @@ def parameters(solution: Solution) -> Floats:
 
 
 def sigmas(solution: Solution) -> Floats:
-    blocks = np.diag(solution.reduction.covariance().cameras).reshape(-1, 15)
-    return np.sqrt(blocks[:, [0, 1, 2, 3, 4, 9, 10, 11]])
+    blocks = np.diag(solution.reduction.covariance().cameras).reshape(-1, PER_CAMERA)
+    return np.sqrt(blocks[:, [0, 1, 2, 3, 4, INTERIOR, INTERIOR + 1, INTERIOR + 2]])
 
 
 def test_ceres_finds_the_same_with_the_same_sigmas() -> None:
