@@ -68,7 +68,7 @@ def study(
             identity = study_identity(request.study, request.rigs, heads)
             return identity_in(out / "study.json") in (None, identity)
 
-        kept = str((out / UNITS).resolve())
+        kept = str((out / UNITS).absolute())
         run = RunContext(workers=processes(workers), cache=kept, cluster=dask)
         with grown_folder(out, UNITS, force=force, spare=[plan], same=same) as folder:
             request, inputs = asked()
