@@ -16,7 +16,7 @@ from scipy.spatial import Delaunay
 from scipy.spatial.transform import Rotation
 
 from evaluation.recognition.population import expressive, front_of
-from evaluation.trial.seen import STEEPEST_DEG
+from evaluation.trial.seen import seen_by
 from geometry.arrays import Bools, Floats, Ints
 from geometry.camera import RigCamera
 from geometry.head import HeadShape, random_head_shape
@@ -137,7 +137,7 @@ def sight_of(head: Head, cameras: Sequence[RigCamera]) -> Sight:
     information = np.zeros((len(points), 3, 3))
     widths = []
     for camera in cameras:
-        seen = _seen(points, normals, occluder, camera)
+        seen = seen_by(points, normals, camera, occluder)
         views += seen
         depth = camera.pose.to_camera(points)[:, 2]
         focal_px = camera.camera.focal_length_mm / camera.camera.pixel_pitch_mm
@@ -152,21 +152,6 @@ def sight_of(head: Head, cameras: Sequence[RigCamera]) -> Sight:
     covariance = np.zeros_like(information)
     covariance[good] = np.linalg.inv(information[good])
     return Sight(points, normals, views, covariance, PATCH_PX * float(np.median(widths)))
-
-
-def _seen(points: Floats, normals: Floats, occluder: Occluder, camera: RigCamera) -> Bools:
-    ray = camera.pose.position_rig_mm - points
-    ray = ray / np.linalg.norm(ray, axis=1, keepdims=True)
-    facing = np.einsum("ni,ni->n", ray, normals) >= np.cos(np.radians(STEEPEST_DEG))
-    pixel, depth = camera.camera.project(camera.pose, points)
-    width, height = camera.camera.image_size_px
-    with np.errstate(invalid="ignore"):
-        inside = (depth > 0.0) & (pixel >= 0.0).all(axis=1)
-        inside &= (pixel[:, 0] <= width - 1) & (pixel[:, 1] <= height - 1)
-    seen = np.asarray(facing & inside)
-    tried = np.flatnonzero(seen)
-    seen[tried] = ~occluder.hidden(points[tried], normals[tried], camera.pose.position_rig_mm)
-    return seen
 
 
 def measured(sight: Sight, light: Light, rng: np.random.Generator) -> Floats:

@@ -23,12 +23,10 @@ from geometry.subject import Subject
 from geometry.surface import SurfacePoints
 from rig.solids.bodies import place_body
 from rig.specification.sections.subject import ScanSection, SubjectSection
-from rig.specification.spec import RigSpec
+from rig.specification.solving import solved
 from rig.study.unit import HeadFigures, Place, Unit, UnitResult
-from solver.design import design
 from solver.quality import evaluate
 from solver.result import Quality
-from solver.standing import as_it_stands
 
 KEPT = 16
 """Heads that a worker keeps ready: about 5 MB each."""
@@ -61,7 +59,8 @@ def _solved(unit: Unit, files: Mapping[str, Path], cancel: CancelToken) -> UnitR
     spec = unit.rig.to_spec()
     subjects = _seated(unit, files)
     own = subjects[unit.designed_for]
-    cameras, quality = _designed(own, spec, cancel)
+    made = solved(own, spec, cancel=cancel)
+    cameras, quality = made.cameras, made.quality
     scored = [
         quality if subject is own else evaluate(subject, cameras, spec.limits)
         for subject in subjects
@@ -77,27 +76,6 @@ def _solved(unit: Unit, files: Mapping[str, Path], cancel: CancelToken) -> UnitR
         places=[_place(camera) for camera in cameras],
         size_mm=array_size_mm(cameras).tolist(),
     )
-
-
-def _designed(
-    subject: Subject, spec: RigSpec, cancel: CancelToken
-) -> tuple[tuple[RigCamera, ...], Quality]:
-    if spec.count == 0:
-        stands = as_it_stands(subject, spec.fixed, spec.limits, spec.seed)
-        return stands.cameras, stands.quality
-    made = design(
-        subject,
-        spec.camera,
-        spec.limits,
-        count=spec.count,
-        seed=spec.seed,
-        starts=spec.starts,
-        fixed=spec.fixed,
-        start=spec.start or None,
-        strategy=spec.strategy,
-        cancel=cancel,
-    )
-    return made.cameras, made.quality
 
 
 def _seated(unit: Unit, files: Mapping[str, Path]) -> list[Subject]:

@@ -68,9 +68,9 @@ def restore_session(service: ServiceDep, removed: str) -> SessionSummary:
     return summary(service.rigs.removed.restore(removed))
 
 
-@router.delete("/v1/removed-sessions/{removed}", status_code=204, responses=problems(404))
+@router.delete("/v1/removed-sessions/{removed}", status_code=204, responses=problems(404, 409))
 def erase_session(service: ServiceDep, removed: str) -> None:
-    """Erase a removed session for good, now."""
+    """Erase a removed session for good, now. 409 where some of it cannot be."""
     service.rigs.removed.erase(removed)
 
 

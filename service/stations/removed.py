@@ -5,8 +5,8 @@ They lie in a hidden folder beside the others, each under its name and the momen
 
 from __future__ import annotations
 
-import re
 import shutil
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -17,7 +17,6 @@ from service import logs
 
 FOLDER = ".removed"
 _STAMP = "%Y%m%dT%H%M%S%fZ"
-_ID = re.compile(r"(?P<name>.+)~(?P<stamp>\d{8}T\d{12}Z)")
 
 
 @dataclass(frozen=True)
@@ -41,11 +40,11 @@ class RemovedSessions:
 
     def all(self) -> list[RemovedFolder]:
         """What can still be restored, last removed first; what can no longer be is erased now."""
-        known = self._known()
+        known, now = self._known(), datetime.now(UTC)
         for one in known:
-            if one.until <= datetime.now(UTC):
-                self._erase(one)
-        return [one for one in known if one.until > datetime.now(UTC)]
+            if one.until <= now:
+                _erase(one)
+        return [one for one in known if one.until > now]
 
     def get(self, removed_id: str) -> RemovedFolder:
         """One of them. Raises :class:`NotFoundError`."""
@@ -90,21 +89,37 @@ class RemovedSessions:
         return one.name
 
     def erase(self, removed_id: str) -> None:
-        """Erase one for good."""
-        self._erase(self.get(removed_id))
+        """Erase one for good. Raises :class:`ConflictError` where some of it cannot be."""
+        one = self.get(removed_id)
+        if not _erase(one):
+            raise ConflictError(
+                "session-kept",
+                f"not all of {one.path} can be erased",
+                "see who may write there, then ask again",
+            )
 
     def _known(self) -> list[RemovedFolder]:
         if not self._folder.is_dir():
             return []
-        paths = (path for path in self._folder.iterdir() if _ID.fullmatch(path.name))
-        return sorted(map(self._read, paths), key=lambda one: one.removed_at, reverse=True)
+        found = []
+        for path in self._folder.iterdir():
+            # What somebody else put there is left alone.
+            with suppress(ValueError):
+                found.append(self._read(path))
+        return sorted(found, key=lambda one: one.removed_at, reverse=True)
 
     def _read(self, path: Path) -> RemovedFolder:
         name, _, stamp = path.name.rpartition("~")
         at = datetime.strptime(stamp, _STAMP).replace(tzinfo=UTC)
         return RemovedFolder(path.name, name, at, at + self._grace, path)
 
-    @staticmethod
-    def _erase(one: RemovedFolder) -> None:
-        shutil.rmtree(one.path, ignore_errors=True)
-        logs.log.info("session erased", extra={"fields": {"session": one.name}})
+
+def _erase(one: RemovedFolder) -> bool:
+    """Whether nothing is left of it; what is left is tried again with the next list."""
+    shutil.rmtree(one.path, ignore_errors=True)
+    gone = not one.path.exists()
+    logs.log.info(
+        "session erased" if gone else "session not erased",
+        extra={"fields": {"session": one.name, "path": str(one.path)}},
+    )
+    return gone

@@ -14,12 +14,11 @@ import secrets
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
 from sqlalchemy import Connection, and_, delete, exists, select
 from sqlalchemy.dialects.sqlite import insert
 
+from common.closing import Closing
 from service.store.tables import blobs, documents, job_files, job_inputs, scans, utc_now
 
 _CHUNK_BYTES = 1 << 20
@@ -35,7 +34,7 @@ class StagedFile:
     size_bytes: int
 
 
-class Staging:
+class Staging(Closing):
     """A file being written. Used as a context manager: what was not adopted is removed."""
 
     def __init__(self, path: Path) -> None:
@@ -57,15 +56,8 @@ class Staging:
         self._file.close()
         return StagedFile(self.path, self._hash.hexdigest(), self._size)
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def close(self) -> None:
+        """Let go of it, and of what nobody took over. Closing twice changes nothing."""
         self._file.close()
         self.path.unlink(missing_ok=True)
 

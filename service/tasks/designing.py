@@ -18,15 +18,14 @@ from rig.design.layout import Layout, make_layout
 from rig.report.designfolder import write_design_folder
 from rig.specification.examples import example_text
 from rig.specification.rigfile import parse_rig
+from rig.specification.solving import solved
 from rig.specification.spec import RigSpec
 from service.jobs.engine import Running, Task
 from service.kinds.design import Conflict, DemoRequest, DesignRequest, DesignResult
 from service.kinds.evaluation import Coverage, EvaluationRequest, EvaluationResult
 from service.tasks.reading import notes_of
-from solver.design import design as solve
 from solver.quality import evaluate
 from solver.result import Design, Quality
-from solver.standing import as_it_stands
 
 _READING = 0.02
 _DESIGNING = 0.96
@@ -76,32 +75,18 @@ def _designed(
     """Read, design, lay out, write."""
     running.report(Progress("reading the scan", 0.0))
     prepared = prepare_subject(read_scan(scan, spec.scan_options), spec.subject_options)
-    made = _solved(prepared, spec, workers, running)
+    made = solved(
+        prepared.subject,
+        spec,
+        workers=workers,
+        progress=within(running.report, _READING, _DESIGNING),
+        cancel=running.cancel,
+    )
     running.report(Progress("writing the files", _DESIGNING))
     layout = make_layout(made.cameras, prepared.subject, spec.limits)
     write_design_folder(folder, made, layout, prepared, spec, scan_name)
     running.report(Progress("done", 1.0))
     return _result(made, layout, prepared, spec)
-
-
-def _solved(prepared: PreparedSubject, spec: RigSpec, workers: int, running: Running) -> Design:
-    """The cameras of a rig, or those it has where none is to be placed."""
-    if spec.count == 0:
-        return as_it_stands(prepared.subject, spec.fixed, spec.limits, spec.seed)
-    return solve(
-        prepared.subject,
-        spec.camera,
-        spec.limits,
-        count=spec.count,
-        seed=spec.seed,
-        starts=spec.starts,
-        fixed=spec.fixed,
-        start=spec.start or None,
-        strategy=spec.strategy,
-        workers=workers,
-        progress=within(running.report, _READING, _DESIGNING),
-        cancel=running.cancel,
-    )
 
 
 def write_scan(scan: Scan, path: Path) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from common.errors import CancelledError, InputError
-from common.progress import Progress
+from common.progress import Progress, within
 from evaluation.recognition.faces import read_face
 from evaluation.recognition.gallery import Gallery, Trained
 from evaluation.recognition.galleryfile import read_gallery, write_gallery
@@ -47,15 +47,12 @@ def training(task: Task[TrainingRequest, TrainingResult], running: Running) -> T
             "population-unread", f"no head could be used; {first.name}: {first.why}", "see --help"
         )
 
-    def within(inner: Progress, /) -> None:
-        running.report(Progress(inner.stage, _READ + (1.0 - _READ) * inner.fraction))
-
     numbers = np.unique(np.array(persons), return_inverse=True)[1].astype(np.int64)
     recogniser = train(
         np.stack(images),
         numbers,
         false_match_rate=asked.false_match_rate,
-        progress=within,
+        progress=within(running.report, _READ, 1.0),
         cancel=running.cancel,
     )
     count = int(numbers.max()) + 1

@@ -108,3 +108,22 @@ class TestGrace:
             RemovedSessions(tmp_path, timedelta(days=1)).remove(tmp_path / "anna")
         lock.release()
         assert (tmp_path / "anna").is_dir()
+
+
+def test_what_cannot_be_erased_is_told_and_what_is_not_ours_is_left_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "anna").mkdir()
+    removed = RemovedSessions(tmp_path, timedelta(days=7))
+    one = removed.remove(tmp_path / "anna")
+    for foreign in ("notes", "anna~99999999T999999999999Z"):
+        (one.path.parent / foreign).mkdir()
+    assert [known.id for known in removed.all()] == [one.id]
+    with monkeypatch.context() as kept, pytest.raises(ConflictError, match="erased"):
+        kept.setattr("shutil.rmtree", lambda *_, **__: None)
+        removed.erase(one.id)
+    removed.erase(one.id)
+    assert sorted(path.name for path in one.path.parent.iterdir()) == [
+        "anna~99999999T999999999999Z",
+        "notes",
+    ]

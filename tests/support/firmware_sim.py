@@ -28,7 +28,8 @@ from dataclasses import dataclass
 from enum import IntFlag, StrEnum
 from functools import cache
 from pathlib import Path
-from types import TracebackType
+
+from common.closing import Closing
 
 CLOCK_HZ = 16_000_000
 CYCLES_PER_TICK = 8
@@ -146,7 +147,7 @@ def symbols() -> dict[str, int]:
     }
 
 
-class FirmwareSim:
+class FirmwareSim(Closing):
     """One simulated box. Use it in a ``with``; it never outlives the test's process."""
 
     def __init__(self, simulator: Simulator, log: Path) -> None:
@@ -169,17 +170,6 @@ class FirmwareSim:
         self._log_rows: dict[str, list[tuple[int, str, int]]] = defaultdict(list)
         self.events: list[str] = []
         """Bodies of the events that came while something else was waited for."""
-
-    def __enter__(self) -> FirmwareSim:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def close(self) -> None:
         """End the simulator, whatever it is doing. Closing twice changes nothing."""
