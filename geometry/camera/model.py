@@ -172,12 +172,18 @@ class Camera:
 
     @property
     def field_of_view_deg(self) -> tuple[float, float]:
-        """Horizontal and vertical field of view of the undistorted camera."""
-        w, h = self.sensor_size_mm
-        return (
-            float(np.degrees(2.0 * np.arctan(w / (2.0 * self.focal_length_mm)))),
-            float(np.degrees(2.0 * np.arctan(h / (2.0 * self.focal_length_mm)))),
-        )
+        """Horizontal and vertical field of view through the principal point, as the lens bends it.
+
+        Where the frame reaches beyond the fold of the distortion the view ends at the fold: at
+        most 180 degrees, for what lies behind the camera's plane is not described.
+        """
+        (w, h), (cx, cy) = self.image_size_px, self.principal_point_px
+        ends = np.array([[-0.5, cy], [w - 0.5, cy], [cx, -0.5], [cx, h - 0.5]])
+        seen = self.normalised(ends)
+        tangent = np.array([-seen[0, 0], seen[1, 0], -seen[2, 1], seen[3, 1]])
+        tangent = np.where(np.isfinite(tangent), tangent, fold_radius(self.distortion))
+        left, right, top, bottom = np.degrees(np.arctan(tangent)).tolist()
+        return left + right, top + bottom
 
     def frame_limits(self, margin_px: float = 0.0) -> Floats:
         """Largest upright rectangle of normalised, undistorted coordinates that is in frame.

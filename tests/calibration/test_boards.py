@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import lru_cache
 
-import cv2
 import held_targets
 import numpy as np
 import pytest
 import target_scenes as scenes
+from plain_opencv import plain_board
 
 from calibration.adjustment import calibrate
 from calibration.detection.finding import find_targets
@@ -19,7 +19,6 @@ from calibration.targets.boards import AnyBoard, AprilGrid, Chessboard, DotGrid
 from calibration.targets.files import targets_from, targets_text
 from calibration.targets.kinds import MarkerCarrier, TargetPlan
 from common.errors import InputError
-from geometry.arrays import Floats
 
 CHESS = Chessboard(name="chess", columns=8, rows=5, square_mm=20.0)
 GRID = AprilGrid(name="grid", columns=4, rows=3, tag_mm=30.0, gap_mm=9.0)
@@ -28,27 +27,6 @@ SQUARE_DOTS = DotGrid(
     name="rows", columns=5, rows=4, spacing_mm=25.0, dot_radius_mm=6.0, upright=True
 )
 BOARDS: tuple[AnyBoard, ...] = (CHESS, GRID, DOTS, SQUARE_DOTS)
-
-
-def plain(board: AnyBoard, image: np.ndarray) -> Floats:
-    """The points of a board as OpenCV's own functions give them, in whatever order."""
-    if isinstance(board, Chessboard):
-        size = board.columns - 1, board.rows - 1
-        found, places = cv2.findChessboardCorners(image, size)
-        assert found
-        stop = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 50, 1e-4)
-        places = cv2.cornerSubPix(image, places, (5, 5), (-1, -1), stop)
-    elif isinstance(board, DotGrid):
-        kind = cv2.CALIB_CB_ASYMMETRIC_GRID if board.asymmetric else cv2.CALIB_CB_SYMMETRIC_GRID
-        found, places = cv2.findCirclesGrid(image, (board.columns, board.rows), flags=kind)
-        assert found
-    else:
-        parameters = cv2.aruco.DetectorParameters()
-        parameters.markerBorderBits = board.border_modules
-        parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
-        known = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_APRILTAG_36h11)
-        places, _, _ = cv2.aruco.ArucoDetector(known, parameters).detectMarkers(image)
-    return np.asarray(places, dtype=np.float64).reshape(-1, 2)
 
 
 @pytest.mark.parametrize("board", BOARDS, ids=lambda board: board.name)
@@ -63,7 +41,7 @@ def test_a_board_is_found_whole_and_no_worse_than_by_opencv(board: AnyBoard) -> 
     assert rms <= 0.02
     assert np.abs(error / found.sigma_px).max() < 5.0
     true = np.array(list(truth.values()))
-    away = np.linalg.norm(plain(board, image)[:, None] - true, axis=2).min(axis=1)
+    away = np.linalg.norm(plain_board(board, image)[:, None] - true, axis=2).min(axis=1)
     assert rms <= np.sqrt((away**2).mean() / 2.0)
 
 

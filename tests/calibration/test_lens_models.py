@@ -10,6 +10,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from plain_opencv import opencvs_base_mm
 from wide_pairs import seen_by_two
 
 from calibration.adjustment import Calibration, CalibrationOptions, calibrate
@@ -159,49 +160,6 @@ def test_nerfstudio_takes_one_lens_model_for_all() -> None:
     plain = replace(second, camera=replace(second.camera, distortion=np.zeros(5)))
     with pytest.raises(InputError, match="one lens model"):
         export_files("nerfstudio", (first, plain))
-
-
-FISHEYE_FLAGS = ("USE_INTRINSIC_GUESS", "FIX_SKEW", "RECOMPUTE_EXTRINSIC")
-
-
-def fisheye_flag(name: str) -> int:
-    """OpenCV 5 keeps them with all others."""
-    return int(getattr(cv2.fisheye, f"CALIB_{name}", None) or getattr(cv2, f"CALIB_{name}"))
-
-
-def opencvs_base_mm(seen: Observations, lens: LensModel) -> float:
-    """The distance of both cameras after OpenCV, from the corners that both see."""
-    nominal = seen.targets.carriers[0].nominal_mm
-    shown: tuple[list[Floats], list[Floats], list[Floats]] = ([], [], [])
-    for frame in range(len(seen.frames)):
-        rows = [np.flatnonzero((seen.frame == frame) & (seen.camera == k)) for k in (0, 1)]
-        both = np.intersect1d(seen.target[rows[0]], seen.target[rows[1]])
-        if len(both) < 8:
-            continue
-        shown[0].append(nominal[both][None])
-        for k in (0, 1):
-            own = rows[k][np.isin(seen.target[rows[k]], both)]
-            own = own[np.argsort(seen.target[own])]
-            shown[1 + k].append(seen.pixel[own][None])
-    size = (800, 600)
-    if lens is LensModel.FISHEYE:
-        start = [np.array([[450.0, 0, 399.5], [0, 450.0, 299.5], [0, 0, 1.0]]) for _ in (0, 1)]
-        flags, poses = sum(map(fisheye_flag, FISHEYE_FLAGS)), []
-        for k in (0, 1):
-            found = cv2.fisheye.calibrate(
-                shown[0], shown[1 + k], size, start[k], np.zeros(4), flags=flags
-            )
-            turns = [cv2.Rodrigues(v)[0] for v in found[3]]
-            centres = [-r.T @ np.ravel(t) for r, t in zip(turns, found[4], strict=True)]
-            poses.append(np.array(centres))
-        return float(np.median(np.linalg.norm(poses[1] - poses[0], axis=1)))
-    single = [[np.asarray(v, np.float32) for v in part] for part in shown]
-    flags = cv2.CALIB_RATIONAL_MODEL
-    lenses = [cv2.calibrateCamera(single[0], p, size, None, None, flags=flags) for p in single[1:]]
-    found = cv2.stereoCalibrate(
-        *single, lenses[0][1], lenses[0][2], lenses[1][1], lenses[1][2], size, flags=flags
-    )
-    return float(np.linalg.norm(found[6]))
 
 
 @pytest.mark.slow

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -11,6 +13,7 @@ from hypothesis import strategies as st
 from common.errors import InputError
 from geometry.arrays import Floats
 from geometry.camera import (
+    NO_DISTORTION,
     Body,
     Camera,
     distort,
@@ -233,6 +236,38 @@ def test_a_rational_lens_ends_where_its_divisor_vanishes() -> None:
     assert fold_radius(terms) == pytest.approx(2.0, rel=1e-12)
     # r / (1 + r^2) turns at 1.
     assert fold_radius(np.array([0.0] * 5 + [1.0, 0.0, 0.0])) == pytest.approx(1.0, rel=1e-12)
+
+
+@pytest.mark.parametrize("distortion", [*LENSES, NO_DISTORTION])
+def test_the_field_of_view_is_that_of_the_lens_as_it_bends(distortion: Floats) -> None:
+    kind = camera(distortion)
+    across, down = np.radians(kind.field_of_view_deg)
+    half = np.tan([[across / 2.0, 0.0], [0.0, down / 2.0]])
+    # Decentring of 2.1e-3 moves both ends to one side, by 3 * 2.1e-3 * 0.55^2 * 1200 = 2.3 px.
+    np.testing.assert_allclose(
+        kind.pixels(half) - kind.principal_point_px, [[600.0, 0.0], [0.0, 400.0]], atol=2.5
+    )
+
+
+@pytest.mark.parametrize(
+    ("pitch_mm", "distortion", "across_deg"),
+    [
+        # Equidistant: 1200 px of 0.012 mm over a focal length of 12 mm are 1.2 rad.
+        (0.012, np.zeros(4), np.degrees(1.2)),
+        (0.04, np.zeros(4), 180.0),  # a picture wider than half of space
+        (0.02, BARREL, np.degrees(2.0 * np.arctan(np.sqrt(5.0 / 3.0)))),  # and than the fold
+    ],
+)
+def test_a_wide_view_ends_with_the_lens(
+    pitch_mm: float, distortion: Floats, across_deg: float
+) -> None:
+    assert camera(distortion, pitch_mm).field_of_view_deg[0] == pytest.approx(across_deg)
+
+
+def test_a_frame_aside_of_the_axis_has_the_view_between_its_ends() -> None:
+    aside = replace(camera(NO_DISTORTION), principal_point_px=np.array([-600.5, 399.5]))
+    across = np.degrees(np.arctan(1.5) - np.arctan(0.5))
+    assert aside.field_of_view_deg[0] == pytest.approx(across)
 
 
 @pytest.mark.parametrize("count", [0, 3, 6, 7, 9])
