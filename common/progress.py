@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Protocol
 
+from common.errors import CancelledError
+
 
 @dataclass(frozen=True)
 class Progress:
@@ -61,3 +63,9 @@ class NeverCancelled:
     def is_set(self) -> bool:
         """Never."""
         return False
+
+
+def go_on(cancel: CancelToken) -> None:
+    """Nothing, unless ``cancel`` is set: then ``CancelledError``."""
+    if cancel.is_set():
+        raise CancelledError

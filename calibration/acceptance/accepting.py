@@ -27,8 +27,15 @@ from calibration.adjustment.finite import finite_rows
 from calibration.adjustment.forward import Points, intersected
 from calibration.adjustment.result import Calibration
 from calibration.observations import Carrier, Observations
-from common.errors import CancelledError, InputError
-from common.progress import CancelToken, NeverCancelled, Progress, ProgressCallback, ignore_progress
+from common.errors import InputError
+from common.progress import (
+    CancelToken,
+    NeverCancelled,
+    Progress,
+    ProgressCallback,
+    go_on,
+    ignore_progress,
+)
 from geometry.arrays import Floats, Ints
 
 ARTEFACT_SHARE = 0.2
@@ -76,8 +83,7 @@ def accept(
         calibration.noise.sigmas_px(observations.sigma_px, cameras[observations.camera]),
         count * len(observations.frames),
     )
-    if cancel.is_set():
-        raise CancelledError
+    go_on(cancel)
     progress(Progress("lengths", 0.7))
     bars = bars_among(observations.targets.carriers)
     lines = _lines(observations, bars, points)

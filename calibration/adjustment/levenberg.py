@@ -12,8 +12,14 @@ from calibration.adjustment.network import Network
 from calibration.adjustment.normals import Assembler, Residuals, prior_cost, residuals
 from calibration.adjustment.reduction import Reduction, SingularError
 from calibration.adjustment.state import State
-from common.errors import CancelledError
-from common.progress import CancelToken, NeverCancelled, Progress, ProgressCallback, ignore_progress
+from common.progress import (
+    CancelToken,
+    NeverCancelled,
+    Progress,
+    ProgressCallback,
+    go_on,
+    ignore_progress,
+)
 from geometry.arrays import Floats
 
 MOST = 0.9
@@ -176,8 +182,7 @@ def adjust(
     options, cancel = options or LossOptions(), cancel or NeverCancelled()
     search, stop = _Search(network, start, options), None
     while stop is None and search.iterations < options.max_iterations:
-        if cancel.is_set():
-            raise CancelledError
+        go_on(cancel)
         stop = search.advance()
         search.iterations += 1
         share = search.iterations / (search.iterations + 5.0)

@@ -27,8 +27,15 @@ from calibration.check.tables import (
 from calibration.check.verdicts import STOPPING, CameraCheck, CheckResult, Finding, Kind, Light
 from calibration.defaults import HIDDEN_LIMIT_MM, TOLERANCE_MM
 from calibration.observations import Observations
-from common.errors import CancelledError, InputError
-from common.progress import CancelToken, NeverCancelled, Progress, ProgressCallback, ignore_progress
+from common.errors import InputError
+from common.progress import (
+    CancelToken,
+    NeverCancelled,
+    Progress,
+    ProgressCallback,
+    go_on,
+    ignore_progress,
+)
 
 UNEXPLAINED = 2.0
 """What is left may not be more than this many times the expected misfit."""
@@ -74,13 +81,13 @@ def check(
     if not condition.keep.all():
         observations = observations.subset(np.flatnonzero(condition.keep))
     epoch = epoch_of(reference, observations)
-    _go_on(cancel)
+    go_on(cancel)
     progress(Progress("gross faults", 0.2))
     corrected = corrected_epoch(epoch)
-    _go_on(cancel)
+    go_on(cancel)
     progress(Progress("tests", 0.4))
     diagnosis = diagnose(corrected.epoch, corrected.start.state, corrected.suspects)
-    _go_on(cancel)
+    go_on(cancel)
     progress(Progress("verdict", 0.9))
     return judge(
         reference,
@@ -91,11 +98,6 @@ def check(
         options or CheckOptions(),
         (*condition.findings, *corrected.pictures),
     )
-
-
-def _go_on(cancel: CancelToken) -> None:
-    if cancel.is_set():
-        raise CancelledError
 
 
 def judge(

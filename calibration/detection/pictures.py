@@ -19,8 +19,15 @@ from calibration.detection.opencv import AnyImage
 from calibration.detection.selftest import require_opencv
 from calibration.observations import Observations
 from calibration.targets.kinds import TargetPlan
-from common.errors import CancelledError, InputError
-from common.progress import CancelToken, NeverCancelled, Progress, ProgressCallback, ignore_progress
+from common.errors import InputError
+from common.progress import (
+    CancelToken,
+    NeverCancelled,
+    Progress,
+    ProgressCallback,
+    go_on,
+    ignore_progress,
+)
 
 _POLL_S = 0.1
 _EXPLAINED = 3
@@ -140,7 +147,7 @@ def detect_pictures(
     for number, result in enumerate(_results(jobs, cancel or NeverCancelled(), executor), 1):
         _check_size(pictures, found, result)
         found.append(result)
-        progress(Progress("detection", number / len(jobs), iteration=number))
+        progress(Progress("finding targets", number / len(jobs), iteration=number))
     mirrored = _check_seen(jobs, found)
     straight = len({p.camera for p in pictures}) - len(mirrored)
     if mirrored and not (leave_mirrored and straight >= _LEAST_STRAIGHT):
@@ -157,8 +164,7 @@ def _results(
 ) -> Iterator[Detections]:
     if executor is None:
         for job in jobs:
-            if cancel.is_set():
-                raise CancelledError
+            go_on(cancel)
             yield job()
         return
     futures = [executor.submit(job) for job in jobs]
@@ -172,8 +178,7 @@ def _results(
 
 def _awaited(future: Future[Detections], cancel: CancelToken) -> Detections:
     while True:
-        if cancel.is_set():
-            raise CancelledError
+        go_on(cancel)
         try:
             return future.result(_POLL_S)
         except TimeoutError:

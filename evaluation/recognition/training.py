@@ -6,12 +6,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from common.errors import CancelledError, InputError
+from common.errors import InputError
 from common.progress import (
     CancelToken,
     NeverCancelled,
     Progress,
     ProgressCallback,
+    go_on,
     ignore_progress,
 )
 from evaluation.recognition.classifier import train_classifier
@@ -65,15 +66,10 @@ def train(
     filled = _filled(faces)
     classifiers = []
     for k, places in enumerate(region_places()):
-        _go_on(stop)
+        go_on(stop)
         progress(Progress("training", 0.8 + 0.2 * k / len(REGIONS)))
         classifiers.append(train_classifier(filled[:, places], person))
     return Recogniser(tuple(classifiers), thresholds, rates)
-
-
-def _go_on(cancel: CancelToken) -> None:
-    if cancel.is_set():
-        raise CancelledError
 
 
 def _require_enough(person: Ints, rate: float) -> None:
@@ -118,7 +114,7 @@ def _held_out(
         pick = one | two
         part, part_known = [], []
         for k, places in enumerate(region_places()):
-            _go_on(cancel)
+            go_on(cancel)
             done = (number + k / len(REGIONS)) / _FOLDS
             progress(Progress("trying on persons left out", 0.8 * done))
             classifier = train_classifier(rest[:, places], rest_person)

@@ -7,12 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from common.errors import CancelledError, InputError
+from common.errors import InputError
 from common.progress import (
     CancelToken,
     NeverCancelled,
     Progress,
     ProgressCallback,
+    go_on,
     ignore_progress,
     within,
 )
@@ -92,8 +93,7 @@ def _photographed(
     views = []
     exposure_us = times * studio.sensor.reference_exposure_us
     for number, camera in enumerate(studio.cameras.values()):
-        if cancel.is_set():
-            raise CancelledError
+        go_on(cancel)
         progress(Progress("photographing", PHOTOGRAPHED * number / len(studio.cameras)))
         image = studio.photograph(Shot(camera.name, exposure_us, seed=(1, number)))
         views.append(view_of(image, camera))

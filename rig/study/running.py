@@ -21,9 +21,9 @@ from contextlib import AbstractContextManager, contextmanager
 from multiprocessing.synchronize import Event
 from pathlib import Path
 
-from common.errors import CancelledError, RigwrightError
+from common.errors import RigwrightError
 from common.processes import end_with_parent, single_threaded_children
-from common.progress import CancelToken, NeverCancelled, Progress, ProgressCallback
+from common.progress import CancelToken, NeverCancelled, Progress, ProgressCallback, go_on
 from rig.study.cache import UnitCache
 from rig.study.solving import fault_of, solve_unit
 from rig.study.unit import Unit, UnitResult
@@ -99,8 +99,7 @@ class StudyRun:
         self._look_up()
         self._tell()
         while self._waiting or self._suspects:
-            if cancel.is_set():
-                raise CancelledError
+            go_on(cancel)
             self._with_new_workers(open_executor, at_once, cancel)
         return [self._results[key] for key in self._keys]
 
@@ -129,8 +128,7 @@ class StudyRun:
                     done, _ = wait(self._flying, _POLL_S, FIRST_COMPLETED)
                     for future in done:
                         self._take(future)
-                    if cancel.is_set():
-                        raise CancelledError
+                    go_on(cancel)
         except BrokenExecutor:
             self._lost()
         finally:

@@ -16,7 +16,7 @@ from calibration.detection.pictures import DetectedPictures, TakenPicture, detec
 from calibration.detection.selftest import require_opencv
 from calibration.targets.kinds import TargetPlan
 from common.files.plain import plain
-from common.progress import Progress
+from common.progress import Progress, within
 from service.jobs.engine import Running, Task
 from service.kinds.base import RequestT, ResultT
 from service.kinds.detection import CameraPictures, Detection, RuleCount
@@ -52,16 +52,11 @@ def see(
     with tempfile.TemporaryDirectory(prefix="pictures-", dir=task.folder.parent) as temporary:
         pictures = taken_pictures(task, Path(temporary))
 
-        def within(inner: Progress, /) -> None:
-            running.report(
-                Progress("finding targets", DETECTING * inner.fraction, iteration=inner.iteration)
-            )
-
         with _executor(task.run.workers, len(pictures)) as executor:
             seen = detect_pictures(
                 [TakenPicture(p.camera, p.frame, p.path) for p in pictures],
                 plan,
-                progress=within,
+                progress=within(running.report, 0.0, DETECTING),
                 cancel=running.cancel,
                 executor=executor,
                 leave_mirrored=leave_mirrored,

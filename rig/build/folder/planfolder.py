@@ -6,9 +6,15 @@ import hashlib
 import json
 from pathlib import Path
 
-from common.errors import CancelledError
 from common.files.folders import refuse_others, whole_folder
-from common.progress import CancelToken, NeverCancelled, Progress, ProgressCallback, ignore_progress
+from common.progress import (
+    CancelToken,
+    NeverCancelled,
+    Progress,
+    ProgressCallback,
+    go_on,
+    ignore_progress,
+)
 from rig.build.folder.planfiles import PlanFile, PlanOptions, plan_files
 from rig.build.mounts.plan import MountPlan
 
@@ -42,8 +48,7 @@ def _write_all(
 ) -> None:
     entries = []
     for done, file in enumerate(files):
-        if stop.is_set():
-            raise CancelledError
+        go_on(stop)
         progress(Progress(f"writing {file.name}", done / len(files)))
         data = file.make()
         path = half / file.name
