@@ -15,6 +15,10 @@ OUT ?= out/demo
 TESTS_SIDE_BY_SIDE := -n auto --dist loadfile
 QUICK_WORKERS ?= $(shell $(PYTHON) -c 'import os; print((os.cpu_count() or 1) + 1)')
 
+# Compiled modules are kept: some machines switch that off, and then every command that a test starts
+# compiles the whole program again.
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: help firmware demo mutation test test-slow test-all check format docs benchmarks clean
 
 help:

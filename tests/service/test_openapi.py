@@ -7,6 +7,7 @@ import os
 import re
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,6 @@ from service.api.app import make_app
 from service.api.document import EVENTS
 from service.kinds.examples import body_examples
 
-DOCUMENT: dict[str, Any] = make_app().openapi()
 # Event streams have no end to wait for.
 NOT_FUZZED = r"/events$|/v1/counts"
 # Jobs of all kinds have their routes from one place: two kinds stand for all. TESTS_FUZZ=all
@@ -36,6 +36,11 @@ checks.positive_data_acceptance.expected-statuses = ["2xx", "4xx"]
 include-path-regex = "/sheets"
 checks.positive_data_acceptance.expected-statuses = ["2xx", "4xx"]
 """
+
+
+@cache
+def document() -> dict[str, Any]:
+    return make_app().openapi()
 
 
 def fuzz(url: str, folder: Path, left_out: str, *options: str) -> None:
@@ -61,7 +66,7 @@ def test_a_contract_fuzzer_finds_no_fault(start_server: StartServer, tmp_path: P
 def test_the_committed_document_is_that_of_the_code() -> None:
     written = ROOT / "docs" / "reference" / "openapi.json"
     committed = json.loads(written.read_text(encoding="utf-8"))
-    assert committed == DOCUMENT, (
+    assert committed == document(), (
         "write it again: python -m service.reference.openapi docs/reference/openapi.json"
     )
 
@@ -69,7 +74,7 @@ def test_the_committed_document_is_that_of_the_code() -> None:
 def operations() -> list[tuple[str, str, dict[str, Any]]]:
     return [
         (path, method, operation)
-        for path, methods in DOCUMENT["paths"].items()
+        for path, methods in document()["paths"].items()
         for method, operation in methods.items()
     ]
 
@@ -86,7 +91,7 @@ def test_errors_are_documented_as_problems_only() -> None:
 
 def test_a_scan_is_read_with_the_words_of_a_rig_file() -> None:
     section = ScanSection.model_json_schema()["properties"]
-    parameters = DOCUMENT["paths"]["/v1/scans"]["post"]["parameters"]
+    parameters = document()["paths"]["/v1/scans"]["post"]["parameters"]
     for name in ("units", "up", "front", "subject"):
         (given,) = [p["schema"] for p in parameters if p["name"] == name]
         assert (given["enum"], given["default"]) == (
@@ -125,7 +130,7 @@ def test_from_what_was_made_links_lead_to_what_can_be_done_with_it() -> None:
     for link in links:
         assert {one["operationId"] for one in link.values()} <= known
         assert "self" in link
-    design = DOCUMENT["paths"]["/v1/designs"]["post"]["responses"]["201"]["links"]
+    design = document()["paths"]["/v1/designs"]["post"]["responses"]["201"]["links"]
     assert design["events"] == {
         "operationId": "follow_design",
         "parameters": {"job_id": "$response.body#/id"},
@@ -139,7 +144,7 @@ def test_the_examples_fit_their_schemas() -> None:
         if method != "post" or content is None:
             continue
         shown += 1
-        schema = {**content["schema"], "components": DOCUMENT["components"]}
+        schema = {**content["schema"], "components": document()["components"]}
         jsonschema.Draft202012Validator(schema).validate(content["example"])
     assert shown == len(body_examples())
 
