@@ -23,6 +23,7 @@ from solver.quality import evaluate
 from solver.refinement import optimality_error, refine
 from solver.result import Design, Quality, Relaxation, SolverReport, StartReport, Status
 from solver.search.exchange import search_networks
+from solver.standing import check_angles, check_places
 from solver.starts import kmeans_start, strips, turned
 from solver.strategy import Strategy
 
@@ -134,6 +135,9 @@ def design(
     second of ``cancel`` being set.
     """
     request = Request(subject, camera, limits, count, seed, starts, fixed, start, strategy)
+    check_places(subject, fixed, limits)
+    for k, pose in enumerate(start or (), 1):
+        check_angles(subject, pose, f"start pose {k}")
     token = cancel or NeverCancelled()
     began = time.monotonic()
     tell = _Teller(progress)

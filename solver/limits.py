@@ -244,7 +244,7 @@ class StandOff:
 
 @dataclass(frozen=True)
 class Box:
-    """An axis-aligned box of the rig frame, ``low_mm`` (3,) to ``high_mm`` (3,)."""
+    """A box along the axes of the rig frame, ``low_mm`` (3,) to ``high_mm`` (3,)."""
 
     low_mm: Floats
     high_mm: Floats
@@ -262,7 +262,7 @@ class Box:
 
 @dataclass(frozen=True)
 class Sphere:
-    """A ball of the rig frame."""
+    """A ball."""
 
     centre_mm: Floats
     radius_mm: float
@@ -302,16 +302,25 @@ class HalfSpace:
 Zone = Box | Sphere | HalfSpace
 
 
+class ZoneOrigin(StrEnum):
+    """What zones are given about: the foremost point of the subject, or the rig frame's origin."""
+
+    HEAD = "head"
+    RIG = "rig"
+
+
 @dataclass(frozen=True)
 class Zones:
     """Where cameras may stand.
 
     A body lies wholly inside one of ``allowed`` (when any are given) and wholly outside each of
-    ``forbidden``.
+    ``forbidden``. ``about`` says what their coordinates start from; without it,
+    :func:`solver.zones.origin_of` does.
     """
 
     allowed: tuple[Zone, ...] = ()
     forbidden: tuple[Zone, ...] = ()
+    about: ZoneOrigin | None = None
 
 
 @dataclass(frozen=True)

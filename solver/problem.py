@@ -12,10 +12,11 @@ from geometry.arrays import Bools, Floats
 from geometry.camera import Camera, RigCamera
 from geometry.frames import PHOTO_TO_CV, Pose
 from geometry.subject import Subject
-from solver.limits import Limits
+from solver.limits import Limits, Zones
 from solver.motion import HeadPosition, framing_positions, visibility_positions
 from solver.sphere_cover import sphere_cover
 from solver.variables import FOCUS, PER_CAMERA, Unknowns
+from solver.zones import in_rig_frame
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,6 +93,11 @@ class Problem:
             c if c.fixed else c.moved_to(pose, float(s))
             for c, pose, s in zip(self.cameras, poses, focus, strict=True)
         )
+
+    @cached_property
+    def zones(self) -> Zones:
+        """Where bodies may stand, in the rig frame."""
+        return in_rig_frame(self.limits.zones, self.subject)
 
     @cached_property
     def points(self) -> Floats:

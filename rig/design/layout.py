@@ -99,25 +99,9 @@ class Layout:
         return np.asarray(self.envelope_high_mm - self.envelope_low_mm)
 
 
-NOSE_MM = 15.0
-"""How far about the foremost point of the region the scan itself is searched for the datum."""
-
-
-def foremost_point(subject: Subject) -> Floats:
-    """The point of the subject nearest to the cameras' side (least Y), (3,).
-
-    The region's points are means of their voxels, so the scan's own vertices decide.
-    """
-    points = np.concatenate([subject.check_points.points_mm, subject.design_points.points_mm])
-    first = points[np.argmin(points[:, 1])]
-    vertices = subject.occluder.vertices_mm
-    near = vertices[np.linalg.norm(vertices - first, axis=1) < NOSE_MM]
-    return np.asarray(near[np.argmin(near[:, 1])] if len(near) else first)
-
-
 def make_layout(cameras: tuple[RigCamera, ...], subject: Subject, limits: Limits) -> Layout:
     """The mount layout of ``cameras`` about ``subject``, checked for collisions."""
-    datum = foremost_point(subject)
+    datum = subject.foremost_mm
     bodies = tuple(place_body(camera) for camera in cameras)
     gaps = clearance_table_mm(bodies)
     views = _view_table_mm(cameras, bodies, subject, limits)

@@ -26,6 +26,7 @@ from service.kinds.evaluation import Coverage, EvaluationRequest, EvaluationResu
 from service.tasks.reading import notes_of
 from solver.quality import evaluate
 from solver.result import Design, Quality
+from solver.standing import check_places
 
 _READING = 0.02
 _DESIGNING = 0.96
@@ -63,6 +64,7 @@ def evaluation(
     running.report(Progress("reading the scan and scoring", 0.0))
     scan = read_scan(task.inputs["scan"], spec.scan_options)
     prepared = prepare_subject(scan, spec.subject_options)
+    check_places(prepared.subject, cameras, spec.limits)
     quality = evaluate(prepared.subject, cameras, spec.limits)
     document = json.dumps(evaluation_document(cameras, quality))
     (task.folder / "evaluation.json").write_text(document, encoding="utf-8")

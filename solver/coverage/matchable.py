@@ -18,6 +18,7 @@ from solver.matching import Matching
 from solver.motion import HeadPosition, rest
 from solver.problem import Problem
 from solver.variables import NetworkState
+from solver.zones import in_rig_frame
 
 _STEPS_DEG = (18.0, 6.0)
 """How far apart the places are that cameras could take: fine where the coarse ones see nothing."""
@@ -164,7 +165,8 @@ def reachable(subject: Subject, limits: Limits) -> Bools:
     widest = max(limits.matching.max_angle_deg, 1.5 * _STEPS_DEG[-1])
     matching = replace(limits.matching, max_angle_deg=widest)
     steepest = min(matching.max_incidence_deg, limits.incidence.ray_max_deg)
-    allowed, forbidden = limits.zones.allowed, limits.zones.forbidden
+    zones = in_rig_frame(limits.zones, subject)
+    allowed, forbidden = zones.allowed, zones.forbidden
     out = np.zeros(len(subject.check_points), dtype=np.bool_)
     for step_deg in (s for s in _STEPS_DEG if s <= max(matching.max_angle_deg, _STEPS_DEG[-1])):
         eyes = middle + distance * _outward(subject, step_deg)

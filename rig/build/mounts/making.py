@@ -24,7 +24,6 @@ from rig.build.statics.sag import Masses
 from rig.build.statics.stiffening import Stiffened, settled_sags, stiffened
 from rig.catalogue import load_catalogue
 from rig.catalogue.items import Profile
-from rig.design.layout import foremost_point
 from solver.limits import Limits
 from solver.quality import evaluate
 from solver.result import Quality
@@ -59,7 +58,7 @@ class SystemSpec:
         self, subject: Subject, limits: Limits, standing: tuple[RigCamera, ...]
     ) -> Surroundings:
         """Where a rig for this subject would stand; ``standing`` cameras are there already."""
-        datum = foremost_point(subject)
+        datum = subject.foremost_mm
         floor = self.floor_z_mm
         if floor is None:
             floor = float(np.round(datum[2])) - SEAT_HEIGHT_MM

@@ -11,7 +11,6 @@ from geometry.arrays import Floats
 from geometry.camera import RigCamera
 from geometry.subject import Subject
 from rig.build.mounts.shapes import ConvexShape
-from rig.design.layout import foremost_point
 from rig.solids.convex import box_corners
 from rig.solids.sight import seen_by, view_corners
 from solver.limits import Limits
@@ -68,7 +67,7 @@ class Surroundings:
     @cached_property
     def datum_mm(self) -> Floats:
         """The foremost point of the subject (3,), from which a builder measures."""
-        return foremost_point(self.subject)
+        return self.subject.foremost_mm
 
     @cached_property
     def centroid_mm(self) -> Floats:

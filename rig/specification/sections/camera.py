@@ -7,13 +7,25 @@ from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 from annotated_types import Len
-from pydantic import ConfigDict, Field, ValidationInfo, model_validator
+from pydantic import ConfigDict, Field, ValidationInfo, field_validator, model_validator
 
-from common.files.strict import CameraName, Pair, StrictModel, Vector
+from common.files.strict import CameraName, Pair, StrictModel
 from geometry.camera import Body, Camera
 from rig.specification.sections.parts import CATALOGUE, with_parts
+from rig.specification.sections.plausible import (
+    LENGTHS,
+    SMALL,
+    BodyPlace,
+    BodySize,
+    FocusMm,
+    LensSizeMm,
+    Plausible,
+    meant,
+)
 
 MICROMETRES = 1000.0
+_SHORTEST, _USUAL, _LONGEST = 0.05, 1.5, 60.0
+"""Focal lengths in diagonals of the picture: 169 degrees across, an ordinary lens, 1 degree."""
 
 
 def tidy(value: float) -> float:
@@ -24,17 +36,17 @@ def tidy(value: float) -> float:
 class BodySection(StrictModel):
     """The solid a camera occupies, in the camera frame (x right, y down, z forward)."""
 
-    size_mm: Vector = Field(description="Width, height and depth of the body.")
-    centre_mm: Vector | None = Field(
+    size_mm: BodySize = Field(description="Width, height and depth of the body.")
+    centre_mm: BodyPlace | None = Field(
         default=None,
         description="Centre of the body seen from the projection centre. Without it the body "
         "stands behind the lens and the projection centre lies half-way along the lens.",
     )
-    lens_diameter_mm: float = Field(default=0.0, ge=0.0, description="Outer diameter of the lens.")
-    lens_length_mm: float = Field(
-        default=0.0, ge=0.0, description="How far the lens reaches out of the body's front."
+    lens_diameter_mm: LensSizeMm = Field(default=0.0, description="Outer diameter of the lens.")
+    lens_length_mm: LensSizeMm = Field(
+        default=0.0, description="How far the lens reaches out of the body's front."
     )
-    mount_thread_mm: Vector | None = Field(
+    mount_thread_mm: BodyPlace | None = Field(
         default=None,
         description="Centre of the 1/4-20 thread's mouth. Without it: the middle of the "
         "body's underside.",
@@ -107,21 +119,22 @@ class CameraSection(StrictModel):
     image_size_px: Annotated[list[Annotated[int, Field(ge=2, le=100_000)]], Len(2, 2)] = Field(
         description="Width and height of the image."
     )
-    pixel_pitch_um: float = Field(gt=0.0, description="Distance of neighbouring pixels.")
-    # Far below any lens, yet its square is still a number: limits of sharpness divide by it.
-    focal_length_mm: float = Field(ge=0.01, description="Focal length (principal distance).")
-    f_number: float = Field(gt=0.0, description="Aperture: 16 for f/16.")
-    circle_of_confusion_um: float = Field(
-        gt=0.0,
-        description="Largest blur disk on the sensor that still counts as sharp. With `model`: "
-        "two pixels.",
+    pixel_pitch_um: Annotated[float, Plausible(0.3, 100.0, 4.0, "micrometres", SMALL)] = Field(
+        description="Distance of neighbouring pixels."
     )
-    min_focus_mm: float = Field(
-        gt=0.0, description="Nearest focus setting, from the projection centre."
+    focal_length_mm: float = Field(gt=0.0, description="Focal length (principal distance).")
+    f_number: Annotated[float, Plausible(0.5, 128.0, 8.0)] = Field(
+        description="Aperture: 16 for f/16."
     )
-    focus_mm: float | None = Field(
+    circle_of_confusion_um: Annotated[float, Plausible(0.3, 1000.0, 12.0, "micrometres", SMALL)] = (
+        Field(
+            description="Largest blur disk on the sensor that still counts as sharp. With `model`: "
+            "two pixels.",
+        )
+    )
+    min_focus_mm: FocusMm = Field(description="Nearest focus setting, from the projection centre.")
+    focus_mm: FocusMm | None = Field(
         default=None,
-        gt=0.0,
         description="Focus setting. Without it the design chooses one per camera.",
     )
     distortion: Annotated[list[float], Len(4, 8)] = Field(
@@ -141,6 +154,22 @@ class CameraSection(StrictModel):
         if not isinstance(data, Mapping):
             return data
         return with_parts(data, (info.context or {}).get(CATALOGUE))
+
+    @field_validator("focal_length_mm")
+    @classmethod
+    def _of_a_lens(cls, value: float, info: ValidationInfo) -> float:
+        """A lens is as long as its image is wide, more or less; only both together tell a unit."""
+        size, pitch_um = info.data.get("image_size_px"), info.data.get("pixel_pitch_um")
+        if size is None or pitch_um is None:
+            return value
+        pitch_mm = pitch_um / MICROMETRES
+        diagonal_mm = float(np.hypot(*size)) * pitch_mm
+        shortest, longest = _SHORTEST * diagonal_mm, _LONGEST * diagonal_mm
+        lens = Plausible(max(shortest, 0.01), longest, _USUAL * diagonal_mm, "mm")
+        if lens.holds(value):
+            return value
+        problem = f"no lens of that length has a picture of {diagonal_mm:.3g} mm across"
+        raise ValueError(problem + meant(value, lens, (*LENGTHS, ("pixels", pitch_mm))))
 
     def to_camera(self) -> Camera:
         """The camera as geometry sees it."""

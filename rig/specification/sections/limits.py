@@ -13,6 +13,20 @@ from typing import Annotated, Self, TypeVar
 from pydantic import Field, model_validator
 
 from common.files.strict import StrictModel
+from rig.specification.sections.plausible import (
+    DistanceMm,
+    GapMm,
+    MovementMm,
+    Pixels,
+    Plausible,
+    RangeDeg,
+    RangeMm,
+    Ratio,
+    Share,
+    TurnDeg,
+    angle_deg,
+    length_mm,
+)
 from rig.specification.sections.zones import ZonesSection
 from solver.limits import (
     BaseHeight,
@@ -30,7 +44,6 @@ from solver.limits import (
     Symmetry,
 )
 
-NonNegative = Annotated[float, Field(ge=0.0)]
 Plain = (
     PoseBounds
     | BaseHeight
@@ -72,30 +85,26 @@ def _section(model: type[SwitchedT], limit: Plain | None) -> SwitchedT | None:
 class BoundsSection(Switched):
     """Eq 8: how far each camera may move from its start, to either side."""
 
-    omega_deg: NonNegative | None = Field(
+    omega_deg: RangeDeg | None = Field(
         default=None, description="Half range of omega; absent: free."
     )
-    phi_deg: NonNegative | None = Field(
-        default=None, description="Half range of phi; absent: free."
-    )
-    kappa_deg: NonNegative | None = Field(
+    phi_deg: RangeDeg | None = Field(default=None, description="Half range of phi; absent: free.")
+    kappa_deg: RangeDeg | None = Field(
         default=None, description="Half range of kappa; absent: free."
     )
-    x_mm: NonNegative | None = Field(default=None, description="Half range of X; absent: free.")
-    y_mm: NonNegative | None = Field(default=None, description="Half range of Y; absent: free.")
-    z_mm: NonNegative | None = Field(default=None, description="Half range of Z; absent: free.")
+    x_mm: RangeMm | None = Field(default=None, description="Half range of X; absent: free.")
+    y_mm: RangeMm | None = Field(default=None, description="Half range of Y; absent: free.")
+    z_mm: RangeMm | None = Field(default=None, description="Half range of Z; absent: free.")
 
 
 class BaseHeightSection(Switched):
     """Eq 9: base/height ratio of camera pairs."""
 
-    min: NonNegative | None = Field(default=None, description="Least B/H of every pair.")
-    max: NonNegative | None = Field(default=None, description="Greatest B/H of every pair.")
-    mean_min: NonNegative | None = Field(default=None, description="Least mean B/H over all pairs.")
-    mean_max: NonNegative | None = Field(
-        default=None, description="Greatest mean B/H over all pairs."
-    )
-    neighbour_max: NonNegative | None = Field(
+    min: Ratio | None = Field(default=None, description="Least B/H of every pair.")
+    max: Ratio | None = Field(default=None, description="Greatest B/H of every pair.")
+    mean_min: Ratio | None = Field(default=None, description="Least mean B/H over all pairs.")
+    mean_max: Ratio | None = Field(default=None, description="Greatest mean B/H over all pairs.")
+    neighbour_max: Ratio | None = Field(
         default=None, description="Greatest B/H of each camera and its nearest neighbour."
     )
 
@@ -103,14 +112,12 @@ class BaseHeightSection(Switched):
 class IncidenceSection(Switched):
     """Eq 10: angle of incidence. The switch turns off the mean; ``ray_max_deg`` stays."""
 
-    ray_max_deg: float = Field(
+    ray_max_deg: Annotated[float, angle_deg(2.0, 89.0, 70.0)] = Field(
         default=Incidence().ray_max_deg,
-        ge=0.0,
-        le=89.0,
         description="A point counts as seen up to this angle between its normal and the ray. "
         "It says what a view is, so it holds even when the limit is switched off.",
     )
-    mean_max_deg: NonNegative | None = Field(
+    mean_max_deg: Annotated[float, angle_deg(3.2, 180.0, 30.0)] | None = Field(
         default=None, description="Greatest mean angle of a camera's axis to the points' normals."
     )
 
@@ -122,32 +129,30 @@ class IncidenceSection(Switched):
 class FrameSection(Switched):
     """Eq 11: every seen point lies inside the image. On when the table is absent."""
 
-    margin_px: NonNegative = Field(
-        default=0.0, description="Distance to keep from the image border."
-    )
+    margin_px: Pixels = Field(default=0.0, description="Distance to keep from the image border.")
 
 
 class CentringSection(Switched):
     """Eq 12: the mean image coordinates of the seen points are zero."""
 
-    tolerance_px: NonNegative = Field(default=0.0, description="How far the mean may be off.")
+    tolerance_px: Pixels = Field(default=0.0, description="How far the mean may be off.")
 
 
 class SpacingSection(Switched):
     """Eq 13: the mean Delaunay edge between cameras has a design length."""
 
-    edge_mm: NonNegative = Field(description="The design length.")
-    tolerance_mm: NonNegative = Field(default=0.0, description="How far the mean may be off.")
+    edge_mm: Annotated[float, length_mm(5.0, 1e6, 200.0)] = Field(description="The design length.")
+    tolerance_mm: RangeMm = Field(default=0.0, description="How far the mean may be off.")
 
 
 class SymmetrySection(Switched):
     """Eqs 14 and 15: symmetry of the camera positions about the object's centroid."""
 
     axes: str = Field(default="x", description='Axes it holds for, for example `"x"` or `"xz"`.')
-    median_tolerance_mm: NonNegative | None = Field(
+    median_tolerance_mm: RangeMm | None = Field(
         default=None, description="Eq 14: mean and median agree within this; absent: off."
     )
-    balance_tolerance_mm: NonNegative | None = Field(
+    balance_tolerance_mm: RangeMm | None = Field(
         default=None, description="Eq 15: the mean is zero within this; absent: off."
     )
 
@@ -161,16 +166,15 @@ class SymmetrySection(Switched):
 class TierSection(StrictModel):
     """One step of the coverage."""
 
-    views: int = Field(ge=1, description="Number of views.")
-    share: float = Field(gt=0.0, le=1.0, description="Share of points that need them, 0 to 1.")
+    views: int = Field(ge=1, le=500, description="Number of views.")
+    share: Share = Field(description="Share of points that need them, 0 to 1.")
 
 
 class CoverageSection(Switched):
     """How often points must be seen. The switch turns off the tiers."""
 
-    unseen_sigma_mm: float = Field(
+    unseen_sigma_mm: Annotated[float, length_mm(1e-4, 1e9, 1.0)] = Field(
         default=Coverage().unseen_sigma_mm,
-        gt=0.0,
         description="Standard deviation of a point before anybody looks: what losing it costs.",
     )
     tier: list[TierSection] = Field(default_factory=list, description="The steps.")
@@ -194,26 +198,28 @@ class DepthOfFieldSection(Switched):
 class GsdSection(Switched):
     """Ground sample distance: the size of a pixel on the object."""
 
-    max_mm: float = Field(gt=0.0, description="Largest pixel on the object.")
+    max_mm: Annotated[float, length_mm(5e-4, 100.0, 0.1)] = Field(
+        description="Largest pixel on the object."
+    )
 
 
 class StandOffSection(Switched):
     """Distance of each projection centre from the object's centroid."""
 
-    min_mm: NonNegative | None = Field(default=None, description="Least distance.")
-    max_mm: NonNegative | None = Field(default=None, description="Greatest distance.")
+    min_mm: DistanceMm | None = Field(default=None, description="Least distance.")
+    max_mm: DistanceMm | None = Field(default=None, description="Greatest distance.")
 
 
 class BodiesSection(Switched):
     """Camera bodies do not touch. On when the table is absent."""
 
-    clearance_mm: NonNegative = Field(default=0.0, description="Gap to keep between bodies.")
+    clearance_mm: GapMm = Field(default=0.0, description="Gap to keep between bodies.")
 
 
 class SightLinesSection(Switched):
     """No body stands in another camera's view. On when the table is absent."""
 
-    clearance_mm: NonNegative = Field(default=0.0, description="Gap to keep between body and view.")
+    clearance_mm: GapMm = Field(default=0.0, description="Gap to keep between body and view.")
 
 
 def _clearance(
@@ -227,20 +233,19 @@ def _clearance(
 class MotionSection(Switched):
     """Head movement for which the design must hold, to either side."""
 
-    x_mm: NonNegative = Field(default=0.0, description="Sideways.")
-    y_mm: NonNegative = Field(default=0.0, description="Towards and away from the cameras.")
-    z_mm: NonNegative = Field(default=0.0, description="Up and down.")
-    pitch_deg: NonNegative = Field(default=0.0, le=45.0, description="Turn about X (nodding).")
-    roll_deg: NonNegative = Field(default=0.0, le=45.0, description="Turn about Y (tilting).")
-    yaw_deg: NonNegative = Field(default=0.0, le=45.0, description="Turn about Z (shaking).")
+    x_mm: MovementMm = Field(default=0.0, description="Sideways.")
+    y_mm: MovementMm = Field(default=0.0, description="Towards and away from the cameras.")
+    z_mm: MovementMm = Field(default=0.0, description="Up and down.")
+    pitch_deg: TurnDeg = Field(default=0.0, description="Turn about X (nodding).")
+    roll_deg: TurnDeg = Field(default=0.0, description="Turn about Y (tilting).")
+    yaw_deg: TurnDeg = Field(default=0.0, description="Turn about Z (shaking).")
 
 
 class LimitsSection(StrictModel):
     """Everything the rig must respect."""
 
-    image_sigma_px: float = Field(
+    image_sigma_px: Annotated[float, Plausible(1e-3, 100.0, 0.5, "pixels")] = Field(
         default=Limits().image_sigma_px,
-        gt=0.0,
         description="Standard deviation of an image measurement.",
     )
     bounds: BoundsSection | None = Field(default=None, description="Eq 8, bounds about the start.")

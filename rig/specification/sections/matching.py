@@ -3,47 +3,41 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from typing import Self
+from typing import Annotated, Self
 
 from pydantic import Field
 
 from common.files.strict import StrictModel
+from rig.specification.sections.plausible import SHARES, Plausible, Share, angle_deg
 from solver.matching import Matching, PairTier
 
 
 class PairTierSection(StrictModel):
     """One step of how many pairs can match a point."""
 
-    pairs: int = Field(ge=1, description="Number of pairs of cameras that can match a point.")
-    share: float = Field(
-        gt=0.0, le=1.0, description="Share that needs them, of the points that can be matched."
+    pairs: int = Field(
+        ge=1, le=124_750, description="Number of pairs of cameras that can match a point."
     )
+    share: Share = Field(description="Share that needs them, of the points that can be matched.")
 
 
 class MatchingSection(StrictModel):
     """Two cameras can match a point that both see, in frame and sharp, within these limits."""
 
-    max_angle_deg: float = Field(
+    max_angle_deg: Annotated[float, angle_deg(3.2, 180.0, 40.0)] = Field(
         default=Matching().max_angle_deg,
-        gt=0.0,
-        le=180.0,
         description="Greatest angle between the two rays to a point.",
     )
-    max_incidence_deg: float = Field(
+    max_incidence_deg: Annotated[float, angle_deg(2.0, 89.9, 70.0)] = Field(
         default=Matching().max_incidence_deg,
-        gt=0.0,
-        lt=90.0,
         description="Greatest angle between the point's normal and either ray.",
     )
-    max_scale_ratio: float = Field(
+    max_scale_ratio: Annotated[float, Plausible(1.0, 100.0, 1.5, "", SHARES)] = Field(
         default=Matching().max_scale_ratio,
-        ge=1.0,
         description="Greatest ratio of the sizes of the two cameras' pixels at a point.",
     )
-    least_shared: float = Field(
+    least_shared: Share = Field(
         default=Matching().least_shared,
-        gt=0.0,
-        le=1.0,
         description="Share of the points that two cameras must be able to match to be joined: "
         "cameras that are joined, directly or through others, are a group.",
     )

@@ -2,30 +2,36 @@
 
 from __future__ import annotations
 
-from typing import Self
+from typing import Annotated, Self
 
 import numpy as np
-from pydantic import Field, model_validator
+from annotated_types import Len
+from pydantic import AfterValidator, Field, model_validator
 
 from common.errors import InputError
-from common.files.strict import CameraName, Matrix, StrictModel, Vector
+from common.files.strict import CameraName, Matrix, StrictModel
 from geometry.camera import Camera, RigCamera
 from geometry.frames import Pose
 from geometry.rotations import nearest_rotation
 from rig.specification.sections.camera import CameraSection
+from rig.specification.sections.plausible import FocusMm, Plausible, Position, place_of_size
 
+Angles = Annotated[
+    list[Annotated[float, Plausible(0.0, 720.0, 90.0, "degrees", signed=True)]], Len(3, 3)
+]
+StandingPlace = Annotated[Position, AfterValidator(place_of_size)]
 ORIENTATIONS = ("omega_phi_kappa_deg", "rotation_rig_to_camera", "look_at_mm")
 
 
 class PoseSection(StrictModel):
     """Where a camera stands and where it looks, said in exactly one of three ways."""
 
-    position_mm: Vector = Field(description="Projection centre in the rig frame.")
-    omega_phi_kappa_deg: Vector | None = Field(default=None, description="Photogrammetric angles.")
+    position_mm: StandingPlace = Field(description="Projection centre in the rig frame.")
+    omega_phi_kappa_deg: Angles | None = Field(default=None, description="Photogrammetric angles.")
     rotation_rig_to_camera: Matrix | None = Field(
         default=None, description="Rotation matrix, rows are the camera's x, y and z axes."
     )
-    look_at_mm: Vector | None = Field(
+    look_at_mm: Position | None = Field(
         default=None, description="Point the camera looks at, with a level image."
     )
 
@@ -61,9 +67,8 @@ class FixedSection(PoseSection):
     """A camera of an existing rig, which a design leaves where it is."""
 
     name: CameraName = Field(description="What to call this camera.")
-    focus_mm: float | None = Field(
+    focus_mm: FocusMm | None = Field(
         default=None,
-        gt=0.0,
         description="Focus setting. Without it: the camera's own, or the distance to `look_at_mm`.",
     )
     camera: CameraSection | None = Field(

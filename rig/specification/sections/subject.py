@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -11,6 +11,7 @@ from common.files.strict import Matrix, StrictModel, Vector
 from geometry.face import RegionBox, RegionSphere
 from geometry.preparation import SubjectOptions
 from geometry.scanoptions import ScanOptions
+from rig.specification.sections.plausible import Plausible, Position, RadiusMm, box_of_size
 
 Axis = Literal["auto", "+x", "-x", "+y", "-y", "+z", "-z"]
 Unit = Literal["auto", "mm", "cm", "m", "inch"]
@@ -30,8 +31,8 @@ class ScanSection(StrictModel):
     """How to read the scan. What is left at ``auto`` is inferred, and the report says so."""
 
     units: Unit = Field(default="auto", description="Unit of the file's coordinates.")
-    scale: float | None = Field(
-        default=None, gt=0.0, description="Millimetres per unit, instead of units."
+    scale: Annotated[float, Plausible(1e-6, 1e6, 1.0)] | None = Field(
+        default=None, description="Millimetres per unit, instead of units."
     )
     up: Axis = Field(default="auto", description="Axis of the file that points up.")
     front: Axis = Field(default="auto", description="Axis of the file that the face looks along.")
@@ -69,15 +70,20 @@ class ScanSection(StrictModel):
 class BoxRegion(StrictModel):
     """A box along the axes of the rig frame."""
 
-    low_mm: Vector = Field(description="Corner with the smaller coordinates.")
-    high_mm: Vector = Field(description="Corner with the greater coordinates.")
+    low_mm: Position = Field(description="Corner with the smaller coordinates.")
+    high_mm: Position = Field(description="Corner with the greater coordinates.")
+
+    @model_validator(mode="after")
+    def _of_size(self) -> Self:
+        box_of_size(self.low_mm, self.high_mm)
+        return self
 
 
 class BallRegion(StrictModel):
     """A ball."""
 
-    centre_mm: Vector = Field(description="Centre.")
-    radius_mm: float = Field(gt=0.0, description="Radius.")
+    centre_mm: Position = Field(description="Centre.")
+    radius_mm: RadiusMm = Field(description="Radius.")
 
 
 class SubjectSection(StrictModel):

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Literal, Self
+from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from common.files.strict import StrictModel, Vector
-from solver.limits import Box, HalfSpace, Sphere, Zone, Zones
+from rig.specification.sections.plausible import (
+    FARTHEST_MM,
+    Position,
+    RadiusMm,
+    box_of_size,
+    length_mm,
+)
+from solver.limits import Box, HalfSpace, Sphere, Zone, ZoneOrigin, Zones
 
 Use = Literal["allowed", "forbidden"]
 
@@ -20,8 +27,13 @@ class _ZoneSection(StrictModel):
 class BoxSection(_ZoneSection):
     """A box along the axes of the rig frame."""
 
-    low_mm: Vector = Field(description="Corner with the smaller coordinates.")
-    high_mm: Vector = Field(description="Corner with the greater coordinates.")
+    low_mm: Position = Field(description="Corner with the smaller coordinates.")
+    high_mm: Position = Field(description="Corner with the greater coordinates.")
+
+    @model_validator(mode="after")
+    def _of_size(self) -> Self:
+        box_of_size(self.low_mm, self.high_mm)
+        return self
 
     def to_zone(self) -> Zone:
         """The zone as the solver sees it."""
@@ -31,8 +43,8 @@ class BoxSection(_ZoneSection):
 class SphereSection(_ZoneSection):
     """A ball."""
 
-    centre_mm: Vector = Field(description="Centre.")
-    radius_mm: float = Field(gt=0.0, description="Radius.")
+    centre_mm: Position = Field(description="Centre.")
+    radius_mm: RadiusMm = Field(description="Radius.")
 
     def to_zone(self) -> Zone:
         """The zone as the solver sees it."""
@@ -43,7 +55,9 @@ class PlaneSection(_ZoneSection):
     """The side of a plane to which its normal points: ``normal . x >= offset_mm``."""
 
     normal: Vector = Field(description="Direction that points into the zone.")
-    offset_mm: float = Field(description="Distance of the plane from the origin along the normal.")
+    offset_mm: Annotated[float, length_mm(1.0, FARTHEST_MM, 300.0, zero=True, signed=True)] = Field(
+        description="Distance of the plane from the zones' origin along the normal."
+    )
 
     def to_zone(self) -> Zone:
         """The zone as the solver sees it."""
@@ -58,6 +72,14 @@ class ZonesSection(StrictModel):
     enabled: bool = Field(
         default=True, description="`false` switches the limit off and keeps its numbers."
     )
+    frame: ZoneOrigin | None = Field(
+        default=None,
+        strict=False,
+        description='What coordinates start from, along the axes of the rig frame: `"head"`, '
+        'the foremost point of the subject (the nose tip); `"rig"`, the origin of the rig frame. '
+        "Without it: the origin where it lies in the scan or within 100 mm of it, otherwise the "
+        "head.",
+    )
     box: list[BoxSection] = Field(default_factory=list, description="Boxes.")
     sphere: list[SphereSection] = Field(default_factory=list, description="Balls.")
     plane: list[PlaneSection] = Field(default_factory=list, description="Sides of planes.")
@@ -71,6 +93,7 @@ class ZonesSection(StrictModel):
         return Zones(
             allowed=tuple(z.to_zone() for z in every if z.use == "allowed"),
             forbidden=tuple(z.to_zone() for z in every if z.use == "forbidden"),
+            about=self.frame,
         )
 
     @classmethod
@@ -91,4 +114,4 @@ class ZonesSection(StrictModel):
             else:
                 normal = zone.normal.tolist()
                 planes.append(PlaneSection(use=use, normal=normal, offset_mm=zone.offset_mm))
-        return cls(box=boxes, sphere=spheres, plane=planes)
+        return cls(frame=zones.about, box=boxes, sphere=spheres, plane=planes)

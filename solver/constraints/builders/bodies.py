@@ -96,7 +96,7 @@ def _outside(problem: Problem, state: NetworkState, i: int, zone: Zone) -> Candi
 
 def zone_constraints(problem: Problem, state: NetworkState) -> list[CandidateConstraints]:
     """Bodies inside one allowed zone, the nearest, and outside all forbidden ones."""
-    zones = problem.limits.zones
+    zones = problem.zones
     out = []
     for i, camera in enumerate(problem.cameras):
         if camera.fixed:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ from geometry.reading import read_scan
 from rig.specification.examples import example_names, example_rig, example_text
 from rig.specification.rigfile import RigFile, parse_rig, read_rig, rig_from_mapping
 from rig.specification.strategies import Strategy
-from solver.limits import Box, HalfSpace, Limits, Roll, Sphere
+from solver.limits import Box, HalfSpace, Limits, Roll, Sphere, ZoneOrigin
 from solver.matching import Matching, PairTier
 
 
@@ -196,6 +197,10 @@ def test_zones_of_all_kinds() -> None:
     read = rig_from_mapping(put(face(), "limits.zones", zones)).limits.zones
     assert [type(zone) for zone in read.allowed] == [Sphere, HalfSpace]
     assert isinstance(read.forbidden[0], Box)
+    assert read.about is None
+    about = rig_from_mapping(put(face(), "limits.zones", {**zones, "frame": "head"}))
+    assert about.limits.zones.about is ZoneOrigin.HEAD
+    assert RigFile.from_spec(about).to_spec().limits.zones.about is ZoneOrigin.HEAD
     plane = read.allowed[1]
     assert isinstance(plane, HalfSpace)
     assert plane.normal.tolist() == [0.0, -1.0, 0.0] and plane.offset_mm == 150.0
@@ -235,7 +240,7 @@ LINES = {
     ),
     "camra": ({}, "camra is not known; did you mean camera?"),
     "zzz": (1, "zzz is not known; the keys here are schema, name, cameras"),
-    "camera.f_number": (-1.0, "camera.f_number is -1.0; it should be greater than 0"),
+    "camera.f_number": (-1.0, "camera.f_number is -1.0; it should be from 0.5 to 128"),
     "camera.image_size_px": ([4000], "camera.image_size_px is [4000]; "),
     "cameras": (7.5, "cameras is 7.5; it should be a valid integer"),
     "camera.focal_length_mm": (
@@ -250,6 +255,42 @@ LINES = {
     ),
     "start": ([{"position_mm": [0, 0, 0]}], "start[0]; give exactly one of omega_phi_kappa_deg"),
     "subject.region": ("nose", "subject.region is 'nose'"),
+    "camera.pixel_pitch_um": (5800.0, "100 micrometres; did you mean 5.8 micrometres (5800 nano"),
+    "camera.circle_of_confusion_um": (0.0115, "did you mean 11.5 micrometres (0.0115 millimet"),
+    "camera.min_focus_mm": (0.35, "did you mean 350 mm (0.35 metres)?"),
+    "camera.body": (
+        {"size_mm": [0.062, 0.045, 0.032]},
+        "camera.body.size_mm[0] is 0.062 (2 more to mend after it); it should be from 1 to 2000 mm",
+    ),
+    "limits.incidence.ray_max_deg": (1.3, "did you mean 74.48 degrees (1.3 radians)?"),
+    "limits.incidence": ({"ray_max_deg": 0.0}, "it should be from 2 to 89 degrees"),
+    "limits.stand_off": ({"min_mm": 0.5}, "did you mean 500 mm (0.5 metres)?"),
+    "limits.base_height.neighbour_max": (30.0, "did you mean 0.3 (30 per cent)?"),
+    "limits.coverage": (
+        {"tier": [{"views": 2, "share": 99.9}]},
+        "limits.coverage.tier[0].share is 99.9; it should be from 1e-06 to 1; did you mean 0.999",
+    ),
+    "limits.motion": ({"yaw_deg": 0.087}, "did you mean 4.985 degrees (0.087 radians)?"),
+    "limits.gsd": ({"max_mm": 150.0}, "did you mean 0.15 mm (150 micrometres)?"),
+    "limits.spacing.edge_mm": (0.2, "did you mean 200 mm (0.2 metres)?"),
+    "limits.zones.sphere": (
+        [{"use": "allowed", "centre_mm": [0, -1, 0], "radius_mm": 0.4}],
+        "did you mean 400 mm (0.4 metres)?",
+    ),
+    "limits.zones.box": (
+        [{"use": "allowed", "low_mm": [-0.3, -2, -0.9], "high_mm": [0.3, -0.1, -0.4]}],
+        "a box of 0.6 x 1.9 x 0.5 mm holds nothing; did you give its corners in metres?",
+    ),
+    "limits.zones.plane": (
+        [{"use": "allowed", "normal": [0, -1, 0], "offset_mm": 0.15}],
+        "did you mean 150 mm (0.15 metres)?",
+    ),
+    "fixed": (
+        [{"name": "a", "position_mm": [0.2, -0.7, 0], "look_at_mm": [0, 0, 0]}],
+        "did you mean [200, -700, 0] (metres)?",
+    ),
+    "matching": ({"max_angle_deg": 0.7}, "did you mean 40.11 degrees (0.7 radians)?"),
+    "subject.sphere": ({"centre_mm": [0, 0, 0], "radius_mm": 0.09}, "did you mean 90 mm (0.09 me"),
     "strategy": ("luck", "strategy is 'luck'; it should be 'exchange' or 'k-means'"),
 }
 
@@ -263,6 +304,52 @@ def test_errors_are_one_line_that_says_what_to_do(path: str) -> None:
     assert message.startswith("my.toml: ")
     assert expected in message
     assert "\n" not in message
+
+
+LENSES = {
+    0.05: "did you mean 50 mm (0.05 metres)?",
+    8665.5: "did you mean 50 mm (8665.5 pixels)?",
+    50_000.0: "did you mean 50 mm (50000 micrometres)?",
+    1.0: "did you mean 25.4 mm (1 inches)?",
+}
+
+
+@pytest.mark.parametrize("given", LENSES)
+def test_a_focal_length_in_another_unit_is_told_by_the_picture(given: float) -> None:
+    with pytest.raises(InputError) as caught:
+        rig_from_mapping(put(face(), "camera.focal_length_mm", given))
+    # 4000 x 2667 pixels of 5.77 um are 27.7 mm across.
+    assert "no lens of that length has a picture of 27.7 mm across" in str(caught.value)
+    assert LENSES[given] in str(caught.value)
+
+
+def test_every_number_of_a_rig_file_has_two_ends() -> None:
+    def numbers(schema: object, path: str) -> Iterator[tuple[str, dict[str, Any]]]:
+        if isinstance(schema, dict):
+            if schema.get("type") in ("number", "integer"):
+                yield path, schema
+            for key, inner in schema.items():
+                yield from numbers(inner, f"{path}/{key}")
+        elif isinstance(schema, list):
+            for k, inner in enumerate(schema):
+                yield from numbers(inner, f"{path}/{k}")
+
+    found = dict(numbers(RigFile.model_json_schema(), ""))
+    low, high = ({"minimum", "exclusiveMinimum"}, {"maximum", "exclusiveMaximum"})
+    open_ended = {p for p, s in found.items() if not (low & set(s) and high & set(s))}
+    # A focal length is held by its picture; the others are a scan's own units, or have none.
+    told = {p.split("/properties/")[1].split("/")[0] for p in open_ended}
+    assert told == {"focal_length_mm", "distortion", "principal_point_px", *OWN}, open_ended
+
+
+OWN = (
+    "rotation_rig_to_camera",
+    "rotation_file_to_rig",
+    "normal",
+    "nose_tip",
+    "left_eye",
+    "right_eye",
+)
 
 
 def test_a_missing_key_is_named() -> None:

@@ -1,0 +1,49 @@
+"""Zones in the rig frame, whatever they are given about."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from geometry.arrays import Floats
+from geometry.subject import Subject
+from solver.limits import Box, HalfSpace, Sphere, Zone, ZoneOrigin, Zones
+
+_BESIDE_MM = 100.0
+"""An origin this near to the scan is the scan's own: a centre of the head, a foot of a stand."""
+
+
+def origin_of(zones: Zones, subject: Subject) -> ZoneOrigin:
+    """What zones are about that do not say it.
+
+    The rig frame's origin where it lies in the scan or beside it, and where nothing but points
+    is given; a scan that stands elsewhere has an origin that has nothing to do with the head.
+    """
+    vertices = subject.occluder.vertices_mm
+    if zones.about is not None:
+        return zones.about
+    if not len(vertices):
+        return ZoneOrigin.RIG
+    low, high = vertices.min(axis=0) - _BESIDE_MM, vertices.max(axis=0) + _BESIDE_MM
+    return ZoneOrigin.RIG if bool(((low <= 0.0) & (high >= 0.0)).all()) else ZoneOrigin.HEAD
+
+
+def in_rig_frame(zones: Zones, subject: Subject) -> Zones:
+    """The same zones with the coordinates that they have in the rig frame."""
+    if not (zones.allowed or zones.forbidden) or origin_of(zones, subject) is ZoneOrigin.RIG:
+        return zones
+    by = subject.foremost_mm
+    return Zones(
+        tuple(_moved(zone, by) for zone in zones.allowed),
+        tuple(_moved(zone, by) for zone in zones.forbidden),
+        ZoneOrigin.RIG,
+    )
+
+
+def _moved(zone: Zone, by_mm: Floats) -> Zone:
+    if isinstance(zone, Box):
+        return Box(zone.low_mm + by_mm, zone.high_mm + by_mm)
+    if isinstance(zone, Sphere):
+        return replace(zone, centre_mm=zone.centre_mm + by_mm)
+    return HalfSpace(zone.normal, zone.offset_mm + float(np.dot(zone.normal, by_mm)))
