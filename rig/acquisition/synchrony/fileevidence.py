@@ -161,7 +161,8 @@ class FileEvidence:
         frames = _own(given, memory, owners, faults)
         exposures = _exposures(frames)
         found: dict[int, tuple[FileExposure, Method]] = {}
-        fits = [(e, self._fits(given, memory, e, faults)) for e in exposures]
+        lone = len(exposures) <= len(given.shots)
+        fits = [(e, self._fits(given, memory, e, lone, faults)) for e in exposures]
         usable = [(e, shots) for e, shots in fits if shots]
         if len(usable) == len(given.shots) and _in_order(given, usable):
             for shot, (exposure, _) in zip(given.shots, usable, strict=True):
@@ -177,13 +178,18 @@ class FileEvidence:
         return _pairings(given, found, faults)
 
     def _fits(
-        self, given: FileDelivery, memory: CameraFiles, exposure: FileExposure, faults: list[Fault]
+        self,
+        given: FileDelivery,
+        memory: CameraFiles,
+        exposure: FileExposure,
+        lone: bool,
+        faults: list[Fault],
     ) -> list[FiredShot]:
         """The shots of this capture that a file may be of; none when it is held back."""
         if exposure.time is None:
             return _untimed(given, memory, exposure, faults)
         if memory.offset is None:
-            return self._first(given, memory, exposure, exposure.time, faults)
+            return self._first(given, memory, exposure, exposure.time, lone, faults)
         age_ns = max(0, given.shots[0].at_ns - memory.known_at_ns)
         drift_ns = round(DRIFT * age_ns)
         offset = memory.offset.wider(drift_ns, drift_ns)
@@ -197,7 +203,7 @@ class FileEvidence:
             why = f"it is of capture {others[-1].capture_id}, and came late"
             memory.outstanding = max(0, memory.outstanding - 1)
         else:
-            return self._first(given, memory, exposure, exposure.time, faults)
+            return self._first(given, memory, exposure, exposure.time, lone, faults)
         _hold(given, exposure, why, faults)
         return []
 
@@ -207,12 +213,16 @@ class FileEvidence:
         memory: CameraFiles,
         exposure: FileExposure,
         at: Span,
+        lone: bool,
         faults: list[Fault],
     ) -> list[FiredShot]:
-        """The same for a camera whose clock's offset is not known, or not the one it was."""
+        """The same for a camera whose clock's offset is not known, or not the one it was.
+
+        ``lone``: no more exposures came than were asked for, so that each may be its shot's.
+        """
         offsets = {shot: _offset(at, shot, given.wait_ns) for shot in given.shots}
         agreed = [s for s, offset in offsets.items() if self._agrees(memory, s, offset)]
-        plain = memory.offset is None and not memory.outstanding
+        plain = memory.offset is None and not memory.outstanding and lone
         near = [s for s, offset in offsets.items() if plain and _is_plain(offset)]
         if agreed or near:
             return agreed or near
@@ -234,8 +244,14 @@ class FileEvidence:
             if clue.shot.capture_id == shot.capture_id or offset.common(clue.offset) is None:
                 continue
             if not self._shifted(shot, offset, clue) or _is_plain(offset):
-                return True
+                return not self._came_late(memory, shot, offset)
         return False
+
+    def _came_late(self, memory: CameraFiles, shot: FiredShot, offset: Span) -> bool:
+        """Whether held pictures have a later clock, by which this one is of an earlier shot."""
+        earlier = [known for known in self._shots if known.at_ns < shot.at_ns - SLACK_NS]
+        late = [offset.shifted(shot.at_ns - known.at_ns) for known in earlier]
+        return any(one.common(clue.offset) for one in late for clue in memory.clues)
 
     def _shifted(self, shot: FiredShot, offset: Span, clue: Clue) -> bool:
         """Whether both could be of the shot before theirs: a camera that lags behind by one."""

@@ -109,6 +109,26 @@ def test_a_clock_in_another_time_zone_is_no_matter() -> None:
     assert sorted_one(FileEvidence(), 1, NOON, picture("1.jpg", NOON + off)).pairs
 
 
+def test_a_clock_off_by_the_pace_does_not_make_late_pictures_right() -> None:
+    evidence, off, pace = FileEvidence(), timedelta(seconds=14.75), timedelta(seconds=15)
+    assert not sorted_one(evidence, 0, NOON).pairs
+    for k in (1, 2):
+        at = NOON + k * pace
+        assert not sorted_one(evidence, k, at, picture(f"{k}.jpg", at + off, str(k))).pairs
+    for k in (4, 6):
+        # By the picture of the shot before, fetched late, the clock would be set right.
+        sorted_one(evidence, k - 1, NOON + (k - 1) * pace)
+        late = picture(f"{k - 1}.jpg", NOON + (k - 1) * pace + off, "late")
+        assert not sorted_one(evidence, k, NOON + k * pace, late).pairs
+
+
+def test_of_two_pictures_none_is_taken_by_a_clock_that_nobody_has_compared() -> None:
+    off = timedelta(seconds=20)
+    by_hand = picture("1.jpg", NOON, "of twenty seconds before")
+    own = picture("2.jpg", NOON + off, "own")
+    assert not sorted_one(FileEvidence(), 1, NOON, by_hand, own).pairs
+
+
 def test_doubles_are_kept_once_and_foreign_copies_held_back() -> None:
     first, again = picture("h1.JPG", NOON, "a"), picture("h1 (copy).JPG", NOON, "a")
     result = sorted_one(FileEvidence(), 1, NOON, first, again)
