@@ -30,6 +30,15 @@ _MODES = 32
 _RIG_FROM_MODEL = 10.0 * np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 
 
+def model_of(path: Path) -> dict[str, Floats]:
+    """The arrays of the model that a face is drawn from."""
+    with np.load(path) as kept:
+        return {
+            name: np.asarray(kept[name])
+            for name in ("neutral", "triangles", "identity", "expression")
+        }
+
+
 def average(model: dict[str, Floats]) -> tuple[Floats, Floats, Callable[[Floats], Floats]]:
     """Points (n, 3) and normals of the average face, and what finds them on other people."""
     vertices = model["neutral"] @ _RIG_FROM_MODEL.T
@@ -91,11 +100,7 @@ def bundled(seed: int, mean: Floats, normals: Floats) -> Floats:
 
 def main() -> None:
     """Draw, find the components, write."""
-    with np.load(sys.argv[1]) as kept:
-        model = {
-            name: np.asarray(kept[name])
-            for name in ("neutral", "triangles", "identity", "expression")
-        }
+    model = model_of(Path(sys.argv[1]))
     rng = np.random.default_rng(0)
     mean, normals, at = average(model)
     people = [resized(at(person(model, rng)), mean) - mean for _ in range(_PEOPLE)]
