@@ -1,6 +1,6 @@
 """Designs for 4 to 9 cameras on a head, beside their start and the best strip.
 
-    python -m benchmarks.faces [--scan HEAD.glb] [--starts 8] [--strategy exchange] [--counts 5 7]
+    python -m benchmarks.faces [--scan HEAD.glb] [--starts 8] [--strategy k-means] [--counts 5 7]
         [--out docs/explanation/face-designs.md]
 
 Without a scan the bundled head is used. The limits are those of the example face rig.
@@ -60,7 +60,7 @@ def main() -> None:
     )
     parser.add_argument("--scan", type=Path, help="a head scan; the bundled head without it")
     parser.add_argument("--starts", type=int, default=8)
-    parser.add_argument("--strategy", type=Strategy, choices=Strategy, default=Strategy.K_MEANS)
+    parser.add_argument("--strategy", type=Strategy, choices=Strategy, default=Strategy.EXCHANGE)
     parser.add_argument("--counts", type=int, nargs="+", default=COUNTS, metavar="N")
     parser.add_argument("--out", type=Path, help="write the table to this file")
     chosen = parser.parse_args()

@@ -120,7 +120,7 @@ def design(
     fixed: tuple[RigCamera, ...] = (),
     start: tuple[Pose, ...] | None = None,
     workers: int = 1,
-    strategy: Strategy = Strategy.K_MEANS,
+    strategy: Strategy = Strategy.EXCHANGE,
     progress: ProgressCallback = ignore_progress,
     cancel: CancelToken | None = None,
 ) -> Design:
@@ -128,11 +128,11 @@ def design(
 
     ``fixed`` cameras of an existing rig stay where they are and take part. ``start`` gives the
     poses of the first start, about which Eq 8 bounds the cameras. ``strategy`` says where starts
-    come from otherwise. The best feasible of ``starts`` wins, worked on by ``workers`` processes;
-    the result does not depend on their number. When the limits contradict each other the nearest
-    network is returned with status ``infeasible`` and the conflicts named. Raises
-    :class:`InputError` for orders that cannot be understood and :class:`CancelledError` within a
-    second of ``cancel`` being set.
+    come from otherwise; where it does not do alone, the report says why. The best feasible one
+    wins, worked on by ``workers`` processes; the result does not depend on their number. When the
+    limits contradict each other the nearest network is returned with status ``infeasible`` and the
+    conflicts named. Raises :class:`InputError` for orders that cannot be understood and
+    :class:`CancelledError` within a second of ``cancel`` being set.
     """
     request = Request(subject, camera, limits, count, seed, starts, fixed, start, strategy)
     check_places(subject, fixed, limits)
@@ -146,7 +146,8 @@ def design(
     tell.expect(0, len(jobs))
     results = run_all(jobs, workers, tell.step, token) if jobs else []
     scores = _scores(jobs, results, token)
-    if not any(s.feasible for s in scores) or not search_knows(limits):
+    note = _why_classical(request, jobs, scores)
+    if note is not None:
         more = _jobs(request, len(jobs), token)
         tell.expect(len(jobs), len(more))
         others = run_all(more, workers, tell.step, token)
@@ -181,6 +182,7 @@ def design(
         seconds=time.monotonic() - began,
         starts=tuple(_start_report(j, r, s) for j, r, s in zip(jobs, results, scores, strict=True)),
         conflicts=found,
+        starts_note=note or "",
     )
     tell.stage("done", 1.0)
     return Design(problem.placed(values), quality, problem.cameras, begin, limits, report)
@@ -225,19 +227,46 @@ def _scores(jobs: list[StartJob], results: list[StartResult], cancel: CancelToke
     return out
 
 
-def search_knows(limits: Limits) -> bool:
-    """Whether the search among candidates heeds all limits that decide where cameras stand."""
-    ratio, bounds = limits.base_height, limits.bounds
-    others = (limits.spacing, limits.symmetry, limits.incidence.mean_max_deg, bounds)
-    means = (ratio.mean_min, ratio.mean_max)
-    return all(v is None for v in (*others, *means))
+def unknown_to_search(limits: Limits) -> tuple[str, ...]:
+    """What decides where cameras stand and the search among candidates does not heed, by name."""
+    ratio = limits.base_height
+    given = {
+        "spacing": limits.spacing,
+        "symmetry": limits.symmetry,
+        "bounds about a start": limits.bounds,
+        "mean incidence": limits.incidence.mean_max_deg,
+        "mean base/height": ratio.mean_min if ratio.mean_max is None else ratio.mean_max,
+    }
+    return tuple(name for name, limit in given.items() if limit is not None)
+
+
+def _searches(request: Request) -> bool:
+    """Whether networks are searched: not about given poses, nor where it would help nothing."""
+    if request.limits.matching.required:
+        # The classical starts know nothing of what can be matched.
+        return request.start is None
+    asked = request.start is None and request.strategy is Strategy.EXCHANGE
+    return asked and not unknown_to_search(request.limits)
+
+
+def _why_classical(request: Request, jobs: list[StartJob], scores: list[Quality]) -> str | None:
+    """Why given or classical starts are to be tried, "" where they are asked for; None if not."""
+    unknown = ", ".join(unknown_to_search(request.limits))
+    ignorant = f"the search does not know some of the limits ({unknown})"
+    if not _searches(request):
+        asked = request.start is not None or request.strategy is Strategy.K_MEANS
+        return "" if asked else f"{ignorant}, so the classical starts were tried instead"
+    tried = "so the classical starts were tried as well"
+    if not jobs:
+        return f"the search found no network that keeps the rules about pairs of cameras, {tried}"
+    if not any(s.feasible for s in scores):
+        return f"no network of the search could be moved to where all limits hold, {tried}"
+    return f"{ignorant}, {tried}" if unknown else None
 
 
 def _searched_jobs(request: Request, cancel: CancelToken) -> list[StartJob]:
     """The best networks of the search among candidates, unless poses to start from are given."""
-    # The classical starts know nothing of what can be matched.
-    asked = request.strategy is Strategy.EXCHANGE or request.limits.matching.required
-    if request.start is not None or not asked:
+    if not _searches(request):
         return []
     found = search_networks(
         request.subject,

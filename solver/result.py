@@ -174,7 +174,10 @@ class Relaxation:
 
 @dataclass(frozen=True)
 class SolverReport:
-    """Why the solver stopped and how good its answer is as an optimum."""
+    """Why the solver stopped and how good its answer is as an optimum.
+
+    ``starts_note``: why starts were tried that the strategy is not made of, if any were.
+    """
 
     engine: str
     status: Status
@@ -186,6 +189,7 @@ class SolverReport:
     seconds: float
     starts: tuple[StartReport, ...]
     conflicts: tuple[Relaxation, ...] = ()
+    starts_note: str = ""
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,9 +8,9 @@ from enum import StrEnum
 class Strategy(StrEnum):
     """Where starts come from.
 
-    ``EXCHANGE``: networks searched among candidate poses, each then moved a little; where none
-    of them meets the limits, or limits are on that the search does not know, also ``K_MEANS``:
-    the source paper's clusters, the best strip, and clusters jittered.
+    ``EXCHANGE``, the default: networks searched among candidate poses, each then moved a little.
+    ``K_MEANS``: the source paper's clusters, the best strip, and clusters jittered; also tried
+    where no network of the search meets the limits, or limits are on that it does not know.
     """
 
     EXCHANGE = "exchange"

@@ -169,6 +169,9 @@ class SolverFigures(StrictModel):
     seconds: Number = Field(description="Wall time; the only figure that differs between runs.")
     starts: list[StartFigures] = Field(description="All starts.")
     conflicts: list[ConflictFigures] = Field(description="Limits that contradict each other.")
+    starts_note: str = Field(
+        default="", description="Why starts were tried that the strategy is not made of."
+    )
 
 
 class PointFigures(StrictModel):

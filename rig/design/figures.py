@@ -142,4 +142,5 @@ def solver_figures(report: SolverReport) -> dict[str, Any]:
             }
             for conflict in report.conflicts
         ],
+        "starts_note": report.starts_note,
     }

@@ -217,6 +217,8 @@ def solver(design: Design) -> str:
         words += " The best start that holds all limits won."
     elif report.starts:
         words += " No start led to a design that holds all limits; the nearest is shown."
+    if report.starts_note:
+        words += f" Of the starts: {esc(report.starts_note)}."
     content = tables.starts_table(report) if report.starts else ""
     if report.conflicts:
         content = (

@@ -45,14 +45,22 @@ class RigFile(StrictModel):
         "Without it: as many as there are `[[start]]` poses, or 7.",
     )
     seed: int = Field(default=0, ge=0, le=2**53 - 1, description="Seed of everything random.")
-    starts: int = Field(default=8, ge=1, le=1000, description="How many starts to try.")
+    starts: int = Field(
+        default=8,
+        ge=1,
+        le=1000,
+        description='How many starts to try; with the strategy `"exchange"` how many of the best '
+        "networks are moved, of which more than two never pay, and how many starts are tried where "
+        "the search does not do.",
+    )
     strategy: Strategy = Field(
-        default=Strategy.K_MEANS,
+        default=Strategy.EXCHANGE,
         strict=False,
         description='Where starts come from: `"exchange"` searches networks among candidate poses '
         'and moves the best two; `"k-means"` clusters the points, as the source paper does, and '
-        "tries the best strip and clusters jittered. Where `[[start]]` poses are given it has no "
-        "say.",
+        "tries the best strip and clusters jittered, as is done where the search does not do: with "
+        "spacing, symmetry, bounds or limits of a mean, or when nothing in it meets the limits. "
+        "Where `[[start]]` poses are given it has no say.",
     )
     camera: CameraSection = Field(description="The kind of camera.")
     limits: LimitsSection = Field(

@@ -21,6 +21,7 @@ from rig.specification.rigfile import parse_rig
 from rig.specification.solving import solved
 from rig.specification.spec import RigSpec
 from service.jobs.engine import Running, Task
+from service.kinds.base import Note
 from service.kinds.design import Conflict, DemoRequest, DesignRequest, DesignResult
 from service.kinds.evaluation import Coverage, EvaluationRequest, EvaluationResult
 from service.tasks.reading import notes_of
@@ -124,6 +125,8 @@ def _result(made: Design, layout: Layout, prepared: PreparedSubject, spec: RigSp
         Conflict(family=c.family, unit=c.unit, give=c.amount, give_alone=c.amount_alone)
         for c in made.solver.conflicts
     ]
+    if made.solver.starts_note:
+        scored.notes.append(Note(kind="warning", text=made.solver.starts_note))
     return DesignResult(
         **dict(scored),
         name=spec.name,

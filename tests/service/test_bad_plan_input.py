@@ -213,7 +213,7 @@ def test_plans_that_cannot_be_asked_for(client: TestClient, name: str) -> None:
 def small_rig() -> JSON:
     rig = tomllib.loads(example_text("face"))
     rig["subject"] = {"design_points": 40, "check_points": 120}
-    return rig | {"cameras": 3, "starts": 1}
+    return rig | {"cameras": 3, "starts": 1, "strategy": "k-means"}
 
 
 @pytest.mark.slow

@@ -16,12 +16,12 @@ RIG = tomllib.loads(example_text("face"))
 
 def test_what_is_asked_for_comes_before_what_the_rig_says() -> None:
     plain = DesignRequest.model_validate({"rig": RIG}).spec()
-    assert (plain.count, plain.seed, plain.starts, plain.strategy) == (7, 1, 8, Strategy.K_MEANS)
-    asked = {"cameras": 5, "seed": 4, "starts": 2, "strategy": "exchange"}
+    assert (plain.count, plain.seed, plain.starts, plain.strategy) == (7, 1, 8, Strategy.EXCHANGE)
+    asked = {"cameras": 5, "seed": 4, "starts": 2, "strategy": "k-means"}
     other = DesignRequest.model_validate({"rig": RIG} | asked).spec()
-    assert (other.count, other.seed, other.starts, other.strategy) == (5, 4, 2, Strategy.EXCHANGE)
-    kept = DesignRequest.model_validate({"rig": RIG | {"strategy": "exchange"}}).spec()
-    assert kept.strategy is Strategy.EXCHANGE
+    assert (other.count, other.seed, other.starts, other.strategy) == (5, 4, 2, Strategy.K_MEANS)
+    kept = DesignRequest.model_validate({"rig": RIG | {"strategy": "k-means"}}).spec()
+    assert kept.strategy is Strategy.K_MEANS
 
 
 def test_a_strategy_that_nobody_knows_is_refused() -> None:

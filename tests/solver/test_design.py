@@ -15,7 +15,7 @@ import rigs
 from common.errors import CancelledError, InputError
 from common.progress import Progress
 from geometry.frames import Pose
-from solver.design import _better_given, best_strip, design
+from solver.design import _better_given, best_strip, design, unknown_to_search
 from solver.limits import (
     BaseHeight,
     Box,
@@ -101,6 +101,7 @@ def test_result_carries_its_evidence() -> None:
 def test_the_search_beats_the_classical_starts() -> None:
     found = standard(Strategy.EXCHANGE)
     assert {"exchange"} == {s.kind for s in found.solver.starts}
+    assert found.solver.starts_note == ""
     assert found.quality.cost_mm2 < standard(Strategy.K_MEANS).quality.cost_mm2
     assert found.start_quality.feasible
 
@@ -122,6 +123,20 @@ def test_where_the_search_finds_nothing_the_classical_starts_are_tried(
     monkeypatch.setattr("solver.design.search_networks", lambda *_: [])
     found = place(rigs.face_limits(), count=3, starts=1, strategy=Strategy.EXCHANGE)
     assert {s.kind for s in found.solver.starts} == {"k-means"}
+    assert "found no network" in found.solver.starts_note
+
+
+def test_what_the_search_does_not_know_is_named() -> None:
+    assert unknown_to_search(rigs.face_limits()) == ()
+    limits = rigs.face_limits(
+        spacing=Spacing(450.0, 5.0), base_height=BaseHeight(min=0.1, mean_max=0.4)
+    )
+    assert unknown_to_search(limits) == ("spacing", "mean base/height")
+    assert unknown_to_search(rigs.wall_limits()) == (
+        "bounds about a start",
+        "mean incidence",
+        "mean base/height",
+    )
 
 
 @pytest.mark.slow

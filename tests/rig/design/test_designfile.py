@@ -147,7 +147,10 @@ def test_numbers_without_a_value_are_null(design: Design) -> None:
     gsd[0] = np.nan
     table = replace(quality.cameras, focus_mm=focus, gsd_mm=gsd)
     report = replace(
-        design.solver, kkt_error=float("nan"), conflicts=(Relaxation("frame", "px", 3.0, None),)
+        design.solver,
+        kkt_error=float("nan"),
+        conflicts=(Relaxation("frame", "px", 3.0, None),),
+        starts_note="nothing else was found",
     )
     odd = replace(design, quality=replace(quality, cameras=table), solver=report)
     document = json.loads(json.dumps(full_document(odd), allow_nan=False))
@@ -155,6 +158,7 @@ def test_numbers_without_a_value_are_null(design: Design) -> None:
     assert first["sharp_to_mm"] is None and first["gsd_mean_mm"] is None
     assert document["solver"]["kkt_error"] is None
     assert document["solver"]["conflicts"][0]["give_alone"] is None
+    assert document["solver"]["starts_note"] == "nothing else was found"
     assert len(design_from_mapping(document).cameras) == 7
 
 

@@ -164,6 +164,7 @@ def test_broken_limits_come_first_and_are_explained(design: Design, subject: Sub
             Relaxation("stand_off_max", "mm", 12.5, None),
             Relaxation("gsd", "mm", 0.01, 0.02),
         ),
+        starts_note="the search knows no <spacing>",
     )
     broken = replace(
         design, quality=replace(design.quality, constraints=tuple(rows)), solver=solver
@@ -174,6 +175,7 @@ def test_broken_limits_come_first_and_are_explained(design: Design, subject: Sub
     assert f"1 of {len(rows)} limits are broken: Base/height, least." in text
     assert "Limits that contradict each other" in text and "12.5 mm" in text
     assert "is not enough" in text
+    assert "Of the starts: the search knows no &lt;spacing&gt;." in text
 
 
 def test_a_subject_of_bare_points(design: Design, subject: Subject) -> None:

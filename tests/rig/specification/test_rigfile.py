@@ -48,10 +48,10 @@ def test_the_face_example_is_the_papers_camera() -> None:
 
 
 def test_where_starts_come_from_is_a_choice_that_is_kept() -> None:
-    assert rig_from_mapping(face()).strategy is Strategy.K_MEANS
-    spec = rig_from_mapping(put(face(), "strategy", "exchange"))
-    assert spec.strategy is Strategy.EXCHANGE
-    assert RigFile.from_spec(spec).to_spec().strategy is Strategy.EXCHANGE
+    assert rig_from_mapping(face()).strategy is Strategy.EXCHANGE
+    spec = rig_from_mapping(put(face(), "strategy", "k-means"))
+    assert spec.strategy is Strategy.K_MEANS
+    assert RigFile.from_spec(spec).to_spec().strategy is Strategy.K_MEANS
 
 
 def test_examples_in_the_folder_are_those_of_the_package(repo: Path) -> None:
