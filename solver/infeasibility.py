@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from common.progress import CancelToken
@@ -19,6 +21,7 @@ from solver.formulation import (
 from solver.nlp.program import NonlinearProgram
 from solver.nlp.sqp import Outcome, minimise
 from solver.problem import Problem
+from solver.quality import evaluate
 from solver.result import Relaxation
 
 _HARD = 1000.0
@@ -32,7 +35,8 @@ def conflicts(problem: Problem, values: Floats, cancel: CancelToken) -> tuple[Re
 
     ``values`` (7 n,) is that network. A family takes part when it is broken there, or when it
     pushes back: its multipliers are what keeps the broken ones from being met. Each is then
-    asked to give way alone.
+    asked to give way alone. Told are those that give way, and those that would be enough alone,
+    by how much the table of limits says that they are missed.
     """
     seen = views(problem, problem.unknowns.state(values))
     rows = candidate_constraints(problem, problem.unknowns.state(values), seen)
@@ -46,9 +50,8 @@ def conflicts(problem: Problem, values: Floats, cancel: CancelToken) -> tuple[Re
 
     nearest = minimise(program, values, watch, max_iterations=_MAX_STEPS, penalty=1e3)
     violations = program.violations(nearest.values)
-    out = []
+    out: list[Relaxation] = []
     for name in _taking_part(program, nearest, violations):
-        unit, natural = _unit(program, name)
         alone = NonlinearProgram(
             problem.unknowns,
             cost,
@@ -60,9 +63,34 @@ def conflicts(problem: Problem, values: Floats, cancel: CancelToken) -> tuple[Re
         found = minimise(alone, nearest.values, watch, max_iterations=_MAX_STEPS, penalty=100.0)
         left = alone.violations(found.values)
         enough = all(left[f] <= 10.0 * SATISFIED for f in program.families if f != name)
-        amount = violations[name] * natural if violations[name] > SATISFIED else 0.0
-        out.append(Relaxation(name, unit, amount, left[name] * natural if enough else None))
-    return (*out, *_coverage(problem, nearest.values))
+        out += _relaxations(problem, name, nearest.values, found.values if enough else None)
+    return (*out, *_coverage(problem, nearest.values, {c.family for c in out}))
+
+
+def _relaxations(
+    problem: Problem, family: str, nearest: Floats, alone: Floats | None
+) -> Iterator[Relaxation]:
+    """What a family gives in the nearest network and in the one where it alone gives way."""
+    now, then = _missed(problem, family, nearest), _missed(problem, family, alone)
+    for name in dict.fromkeys((*now, *then)):
+        unit, amount = now.get(name, (then.get(name, ("", 0.0))[0], 0.0))
+        enough = then.get(name, (unit, 0.0))[1] if alone is not None else None
+        # A family that neither gives nor would be enough helps nobody.
+        if amount > 0.0 or enough:
+            yield Relaxation(name, unit, amount, enough)
+
+
+def _missed(problem: Problem, family: str, values: Floats | None) -> dict[str, tuple[str, float]]:
+    """Unit and amount by which each limit of a family is missed, as the table of limits has it."""
+    if values is None:
+        return {}
+    placed = problem.placed(values)
+    table = evaluate(problem.subject, placed, problem.limits, problem.anchor).constraints
+    out: dict[str, tuple[str, float]] = {}
+    for row in table:
+        if (row.family == family or row.family.startswith(f"{family}_")) and not row.satisfied:
+            out[row.family] = row.unit, max(-row.slack, out.get(row.family, ("", 0.0))[1])
+    return out
 
 
 def _taking_part(
@@ -80,19 +108,14 @@ def _taking_part(
     return [f for f in program.families if f in broken or push[f] > 0.05 * most]
 
 
-def _unit(program: NonlinearProgram, family: str) -> tuple[str, float]:
-    block = next(r.block for r in program.rows if r.block.family == family)
-    return block.unit, block.natural
-
-
-def _coverage(problem: Problem, values: Floats) -> list[Relaxation]:
-    """Shares of points by which the coverage tiers are missed."""
+def _coverage(problem: Problem, values: Floats, told: set[str]) -> list[Relaxation]:
+    """Shares of points by which the coverage tiers are missed that are not ``told`` yet."""
     state = problem.unknowns.state(values)
     seen = views(problem, state).seen.sum(axis=0)
     out = []
     for tier in problem.limits.coverage.tiers:
         missing = tier.share - float((seen >= tier.views).mean())
-        if missing > 0.0:
+        if missing > 0.0 and f"coverage_{tier.views}" not in told:
             out.append(Relaxation(f"coverage_{tier.views}", "", missing, missing))
     check, limit = problem.subject.check_points, problem.limits.incidence.ray_max_deg
     position, eyes = problem.visibility_positions[0], centres_mm(problem, state)

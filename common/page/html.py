@@ -77,9 +77,16 @@ def section(key: str, title: str, words: str, *content: str) -> str:
     return f'<section id="{esc(key)}"><h2>{esc(title)}</h2>{lead}{"".join(content)}</section>'
 
 
-def plot(key: str, caption: str, css: str = "") -> str:
-    """The place of a plotly figure, which the page's script draws."""
+def plot(key: str, caption: str, css: str = "", still: str = "") -> str:
+    """The place of a plotly figure, which the page's script draws.
+
+    ``still`` is the address of a picture of it, shown where the browser cannot draw scenes.
+    """
+    picture, held = "", ""
+    if still:
+        words = f"Still picture of the figure {key}: this browser has no WebGL to turn it."
+        picture, held = f'<img class="still" alt="{esc(words)}" src="{esc(still)}">', " held"
     return (
-        f'<figure class="plot {esc(css)}"><figcaption>{caption}</figcaption>'
-        f'<div class="canvas" id="{esc(key)}"></div></figure>'
+        f'<figure class="plot {esc(css)}{held}"><figcaption>{caption}</figcaption>'
+        f'{picture}<div class="canvas" id="{esc(key)}"></div></figure>'
     )

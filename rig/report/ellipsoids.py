@@ -10,13 +10,13 @@ import numpy as np
 from geometry.arrays import Floats, Ints
 from rig.report.colours import GOOD_TO_BAD, SKIN
 from rig.report.surface import ViewMesh
-from rig.report.three import mesh_trace, scene_layout
+from rig.report.three import mesh_trace, placed, scene_layout, valued
 from solver.result import PointTable
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
 
-SHOWN = 140
+SHOWN = 120
 """Ellipsoids per figure: enough for the pattern, few enough to tell apart."""
 
 TYPICAL_SHARE = 0.04
@@ -136,7 +136,7 @@ def _solid(table: PointTable, shown: Ellipsoids, limits: tuple[float, float]) ->
     words = [
         f"σ {s:.3f} mm, {v} views" for s, v in zip(sigma, table.views[shown.rows], strict=True)
     ]
-    x, y, z = vertices.T.astype(np.float32)
+    x, y, z = placed(vertices).T
     i, j, k = faces.T.astype(np.uint16 if len(vertices) < 65_536 else np.uint32)
     return go.Mesh3d(
         x=x,
@@ -145,7 +145,7 @@ def _solid(table: PointTable, shown: Ellipsoids, limits: tuple[float, float]) ->
         i=i,
         j=j,
         k=k,
-        intensity=np.repeat(sigma, len(corners)).astype(np.float32),
+        intensity=np.repeat(valued(sigma), len(corners)),
         colorscale=GOOD_TO_BAD,
         cmin=limits[0],
         cmax=limits[1],

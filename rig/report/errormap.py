@@ -10,12 +10,12 @@ from geometry.arrays import Floats
 from geometry.subject import Subject
 from rig.report.colours import GOOD_TO_BAD, VIEW_STEPS
 from rig.report.surface import FrontView, RegionLookup, front_view
+from rig.report.three import valued
 from solver.result import PointTable
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
 
-PIXELS = np.float32
 SHADES = 255
 """Shades are bytes from 1 to this, a quarter of the size of floats; 0 is where nothing is."""
 
@@ -96,7 +96,7 @@ def _map(view: FrontView, values: Floats, limits: tuple[float, float] | None) ->
         [
             go.Heatmap(z=skin, **place, **under, colorscale=GREY_SCALE),
             go.Heatmap(
-                z=shown.astype(PIXELS),
+                z=valued(shown),
                 **place,
                 colorscale=scale["colorscale"],
                 zmin=scale["cmin"],

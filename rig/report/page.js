@@ -28,6 +28,7 @@
     const place = document.getElementById(key);
     const figure = figures[key];
     const scene = figure.layout.scene;
+    if (scene && document.body.classList.contains("stilled")) return null;
     if (scene && place.clientWidth < 560) {
       for (const axis of "xyz") scene.camera.eye[axis] *= 1.35;
     }
@@ -53,12 +54,11 @@
     const places = {};
     for (const key of Object.keys(figures)) places[key] = await draw(key);
     if (places["ellipsoids-before"]) together(places["ellipsoids-before"], places["ellipsoids-after"]);
-    const all = Object.values(places);
+    const all = Object.values(places).filter((place) => place);
     dark.addEventListener("change", () => all.forEach(recolour));
-    const count = (key, test) => places[key].data.filter(test).length;
     const shown = JSON.parse(document.body.dataset.view);
     shown.figures = all.length;
-    shown.traces = count("rig-3d", () => true);
+    shown.traces = places["rig-3d"] ? places["rig-3d"].data.length : 0;
     shown.canvases = document.querySelectorAll("canvas").length;
     document.body.dataset.view = JSON.stringify(shown);
     document.body.dataset.ready = "yes";
@@ -68,7 +68,7 @@
     document.body.dataset.ready = "failed";
     const note = document.createElement("p");
     note.className = "fault";
-    note.textContent = "The figures cannot be drawn here: " + fault.message + ". The tables below are complete. Open the page in a browser with WebGL.";
+    note.textContent = "The figures cannot be drawn here: " + fault.message + ". The tables below are complete.";
     document.querySelector("main").prepend(note);
   });
 })();

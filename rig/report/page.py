@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from common.files.plain import number
 from common.page.document import drawn_page, style_sheet
+from common.page.still import still_picture
 from geometry.scan import ScanNote
 from geometry.subject import Subject
 from rig.design.layout import Layout
@@ -30,7 +31,8 @@ from solver.result import Design
 if TYPE_CHECKING:
     import plotly.graph_objects as go
 
-SMALL_HEAD_FACES = 9_000
+SMALL_HEAD_FACES = 6_000
+_SCENES = ("rig-3d", "ellipsoids-before", "ellipsoids-after")
 
 
 @dataclass(frozen=True)
@@ -80,12 +82,13 @@ def _main(
     scan_name: str,
 ) -> str:
     """All sections in their order."""
+    stills = {key: still_picture(plot) for key, plot in figures.plots.items() if key in _SCENES}
     parts = (
         summary.verdict(design, layout),
         summary.tiles(design, layout),
-        sections.rig(),
+        sections.rig(stills),
         sections.accuracy(design),
-        sections.ellipsoids(design, figures.before, figures.after, figures.factor),
+        sections.ellipsoids(design, figures.before, figures.after, figures.factor, stills),
         sections.footprints(design, subject),
         sections.limits(design),
         sections.cameras(design),

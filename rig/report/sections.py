@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from common.page.html import element, esc, figure_text, plot, section
 from geometry.scan import ScanNote
 from geometry.subject import Subject
@@ -13,15 +15,15 @@ from rig.report.matchable import matchable
 from solver.result import Design, Status
 
 
-def rig() -> str:
-    """The rig in three dimensions."""
+def rig(stills: Mapping[str, str]) -> str:
+    """The rig in three dimensions; ``stills`` are addresses of pictures by a figure's key."""
     words = (
         "<b>Drag to turn, scroll to zoom.</b> The subject is coloured by the standard deviation σ "
         "of each point: the longest semi-axis of its error ellipsoid. Point at the surface to read "
         "σ and the number of views, point at a camera to read its setting. Entries of the legend "
         "switch parts on and off, among them the start before optimisation."
     )
-    return section("rig", "The rig", words, plot("rig-3d", "", "large"))
+    return section("rig", "The rig", words, plot("rig-3d", "", "large", stills["rig-3d"]))
 
 
 def accuracy(design: Design) -> str:
@@ -54,7 +56,13 @@ def _titled(title: str, content: str) -> str:
     return f"<div><h3>{esc(title)}</h3>{content}</div>"
 
 
-def ellipsoids(design: Design, before: Ellipsoids, after: Ellipsoids, factor: float) -> str:
+def ellipsoids(
+    design: Design,
+    before: Ellipsoids,
+    after: Ellipsoids,
+    factor: float,
+    stills: Mapping[str, str],
+) -> str:
     """Error ellipsoids before and after."""
     times = f"{factor:,.0f}" if factor >= 1.0 else figure_text(factor)
     words = (
@@ -75,10 +83,11 @@ def ellipsoids(design: Design, before: Ellipsoids, after: Ellipsoids, factor: fl
         )
     pair = "".join(
         (
-            plot(
-                "ellipsoids-before", _median("Start", design.start_quality.sigma_median_mm), "tall"
-            ),
-            plot("ellipsoids-after", _median("Design", design.quality.sigma_median_mm), "tall"),
+            plot(key, _median(name, quality.sigma_median_mm), "tall", stills[key])
+            for key, name, quality in (
+                ("ellipsoids-before", "Start", design.start_quality),
+                ("ellipsoids-after", "Design", design.quality),
+            )
         )
     )
     extra = f'<p class="lead">{" ".join(notes)}</p>' if notes else ""

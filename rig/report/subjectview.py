@@ -9,7 +9,7 @@ import numpy as np
 from geometry.arrays import Ints
 from rig.report.colours import GOOD_TO_BAD, SKIN
 from rig.report.surface import ViewMesh
-from rig.report.three import LAMP, SOFT, mesh_trace
+from rig.report.three import LAMP, SOFT, mesh_trace, placed, valued
 from solver.result import PointTable
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ def _region(mesh: ViewMesh, table: PointTable, colours: dict[str, Any]) -> go.Me
     used, faces = _only_used(mesh.faces[mesh.in_region])
     nearest = mesh.nearest[used]
     words = _words(table)
-    x, y, z = mesh.vertices_mm[used].T.astype(np.float32)
+    x, y, z = placed(mesh.vertices_mm[used]).T
     i, j, k = faces.T.astype(np.uint16 if len(used) < 65_536 else np.uint32)
     return go.Mesh3d(
         x=x,
@@ -72,7 +72,7 @@ def _region(mesh: ViewMesh, table: PointTable, colours: dict[str, Any]) -> go.Me
         i=i,
         j=j,
         k=k,
-        intensity=table.sigma_mm[nearest].astype(np.float32),
+        intensity=valued(table.sigma_mm[nearest]),
         text=[words[n] for n in nearest],
         hovertemplate=HOVER,
         lighting=SOFT,

@@ -13,7 +13,7 @@ from geometry.subject import Subject
 from geometry.viewmesh import simplified
 from solver.result import PointTable
 
-MESH_FACES = 24_000
+MESH_FACES = 16_000
 REACH_IN_SPACINGS = 2.0
 """A place belongs to the region when a point of it is this near, in distances of neighbours."""
 

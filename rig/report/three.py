@@ -16,13 +16,33 @@ LAMP = {"x": -4000, "y": -12000, "z": 9000}
 """Above the left shoulder of a viewer behind the cameras."""
 
 
+_PLACES = 4096.0
+_BITS = 512.0
+
+
+def placed(places_mm: Floats) -> Floats:
+    """Places (N, 3) as a page needs them: to a few thousandths of their extent.
+
+    What is rounded to steps of two packs to half, which is what keeps the page small.
+    """
+    extent = float(np.ptp(places_mm, axis=0).max()) if len(places_mm) else 1.0
+    step = 2.0 ** np.floor(np.log2(max(extent, 1e-6) / _PLACES))
+    return np.asarray((np.round(np.asarray(places_mm) / step) * step).astype(np.float32))
+
+
+def valued(values: Floats) -> Floats:
+    """Values to a thousandth of themselves, likewise."""
+    mantissa, exponent = np.frexp(values)
+    return np.asarray(np.ldexp(np.round(mantissa * _BITS) / _BITS, exponent).astype(np.float32))
+
+
 def mesh_trace(
     vertices_mm: Floats, faces: Ints, colour: str, name: str, **more: object
 ) -> go.Mesh3d:
-    """A mesh (V, 3), (F, 3) in one colour; numbers in single precision, the page gets smaller."""
+    """A mesh (V, 3), (F, 3) in one colour."""
     import plotly.graph_objects as go
 
-    x, y, z = np.asarray(vertices_mm).T.astype(np.float32)
+    x, y, z = placed(vertices_mm).T
     i, j, k = np.asarray(faces).T.astype(np.uint16 if len(vertices_mm) < 65_536 else np.uint32)
     options = {"color": colour, "lighting": SOFT, "lightposition": LAMP, "name": name} | more
     return go.Mesh3d(x=x, y=y, z=z, i=i, j=j, k=k, **options)

@@ -11,6 +11,7 @@ from typing import Any
 import calibrations
 import numpy as np
 import pytest
+from drawn_pages import parts
 
 from calibration.adjustment.result import Calibration
 from calibration.check import CheckOptions, CheckResult, check
@@ -58,15 +59,14 @@ def parsed(page: str) -> Balanced:
 
 def without_scripts(page: str) -> str:
     """A page with figures without its scripts: plotly, the figures, and what draws them."""
-    before, start, _ = page.partition("\n<script>")
+    before, start, _ = page.partition('\n<script type="text/plain"')
     assert start
     return before + page[page.rindex("</script>") + len("</script>") :]
 
 
 def figure_of(page: str) -> dict[str, Any]:
     """The figure that the page's script draws."""
-    start = page.index('id="figures">') + len('id="figures">')
-    found: dict[str, Any] = json.loads(page[start : page.index("</script>", start)])["figure"]
+    found: dict[str, Any] = json.loads(parts(page)["packed"])["figure"]
     return found
 
 

@@ -13,6 +13,7 @@ import rigs
 
 from common.errors import CancelledError
 from common.progress import NeverCancelled
+from solver import infeasibility
 from solver.coverage.views import judge, views
 from solver.formulation import Merit, candidate_constraints, covariance_cost, merit, unknown_bounds
 from solver.infeasibility import conflicts
@@ -223,6 +224,22 @@ def test_a_planted_contradiction_is_named_with_what_it_would_take() -> None:
     # 19.5 m at tan 33 degrees, seen from straight ahead, need 30 m.
     assert 10_000.0 < alone < 40_000.0
     assert max(found["stand_off_max"].amount, found["frame"].amount) > 0.0
+    # Base/height pushes back too, but giving way would not help.
+    assert all(c.amount > 0.0 or c.amount_alone for c in found.values())
+
+
+def test_what_gives_way_is_told_in_the_units_of_the_table_of_limits(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(infeasibility, "_MAX_STEPS", 12)  # near enough, in a fifth of the time
+    # Normals reach 55 degrees to all sides: at 420 mm that depth is not sharp at f/16 and 2 px.
+    problem = face_problem(2, points=30, stand_off=StandOff(400.0, 420.0), coverage=Coverage())
+    table = evaluate(problem.subject, problem.cameras, problem.limits).constraints
+    units = {row.family: row.unit for row in table}
+    found = {c.family: c for c in conflicts(problem, problem.start_values(), NEVER)}
+    assert {f: c.unit for f, c in found.items()} == {f: units[f] for f in found}
+    # The blur beyond the 0.0115 mm that count as sharp, not the millimetres of depth behind it.
+    assert 0.0 < found["depth_of_field"].amount < 0.1
 
 
 def test_coverage_that_falls_short_is_named_by_its_tier() -> None:

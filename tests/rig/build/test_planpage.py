@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 from browsers import chromium
+from drawn_pages import FIGURES, without_plotly
 from plans import plate_plan, tslot_plan
 
 from rig.build.drawings.views import plan_solids
@@ -37,13 +38,6 @@ def page_of(plan: MountPlan) -> str:
 @pytest.fixture(scope="module")
 def page() -> str:
     return page_of(tslot_plan(3))
-
-
-def without_plotly(page: str) -> str:
-    from plotly.offline import get_plotlyjs
-
-    assert get_plotlyjs() in page
-    return page.replace(get_plotlyjs(), "")
 
 
 class Elements(HTMLParser):
@@ -84,7 +78,7 @@ def test_every_part_setting_and_step_is_told(page: str) -> None:
 
 def test_the_figure_holds_every_solid_where_it_stands(page: str) -> None:
     plan = tslot_plan(3)
-    parts = json.loads(re.search(r'id="figures">(.*?)</script>', page, re.DOTALL).group(1))  # type: ignore[union-attr]
+    parts = json.loads(re.search(FIGURES, without_plotly(page), re.DOTALL).group(1))  # type: ignore[union-attr]
     solids = plan_solids(plan)
     corners = np.concatenate([np.array(m["at"]).T for m in parts["ways"].values()])
     wanted = np.concatenate([s.corners_mm for s in solids])

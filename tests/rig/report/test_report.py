@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 from browsers import chromium
+from drawn_pages import FIGURES, without_plotly
 
 from common.page.html import figure_text, percent
 from geometry.raycast import Occluder
@@ -73,13 +74,6 @@ def parsed(page: str) -> Elements:
     return elements
 
 
-def without_plotly(page: str) -> str:
-    from plotly.offline import get_plotlyjs
-
-    assert get_plotlyjs() in page
-    return page.replace(get_plotlyjs(), "")
-
-
 def test_what_can_be_matched_is_told_with_the_groups_of_cameras(
     design: Design, subject: Subject
 ) -> None:
@@ -98,7 +92,7 @@ def test_what_can_be_matched_is_told_with_the_groups_of_cameras(
 def test_the_page_is_well_formed_and_loads_nothing(page: str) -> None:
     elements = parsed(page)
     for tag, attributes in elements.found:
-        assert "src" not in attributes, tag
+        assert (attributes.get("src") or "data:").startswith("data:"), tag
         assert tag != "iframe"
         href = attributes.get("href") or "#"
         assert href.startswith(("#", "data:"))
@@ -108,7 +102,8 @@ def test_the_page_is_well_formed_and_loads_nothing(page: str) -> None:
 
 
 def test_size(page: str) -> None:
-    assert len(page.encode()) < 8_000_000
+    # Nine cameras on a scanned head: 2.85 MB, of which plotly is 1.95, packed.
+    assert len(page.encode()) < 3_000_000
 
 
 def test_every_section_is_there_and_linked(page: str) -> None:
@@ -131,7 +126,7 @@ def test_every_section_is_there_and_linked(page: str) -> None:
         }
     )
     places = {a.get("id") for tag, a in elements.found if tag == "div"} - {None}
-    figures = json.loads(re.search(r'id="figures">(.*?)</script>', page, re.DOTALL).group(1))  # type: ignore[union-attr]
+    figures = json.loads(re.search(FIGURES, without_plotly(page), re.DOTALL).group(1))  # type: ignore[union-attr]
     assert set(figures) == places
 
 
@@ -148,7 +143,7 @@ def test_names_cannot_break_out(hostile_design: Design, subject: Subject) -> Non
     evil = report(hostile_design, subject, title=EVIL, scan_name=EVIL, notes=NOTES)
     rest = without_plotly(evil)
     assert rest.count("<script") == 3
-    assert "<img" not in rest
+    assert "<img src=x" not in rest
     assert html.escape(EVIL, quote=True) in rest
     parsed(evil)
 
@@ -182,7 +177,7 @@ def test_a_subject_of_bare_points(design: Design, subject: Subject) -> None:
     bare = replace(subject, occluder=Occluder.none())
     text = report(design, bare)
     parsed(text)
-    assert '"type":"mesh3d"' in text, "the bodies"
+    assert '"type":"mesh3d"' in without_plotly(text), "the bodies"
 
 
 def test_figures_for_people() -> None:
@@ -251,7 +246,7 @@ def test_a_browser_draws_it(
     view = visit.view
     assert view["cameras"] == 7 and view["figures"] == 6 and view["canvases"] == 3
     assert view["limits"] == len(design.quality.constraints)
-    assert 10_000 < view["triangles"] <= 24_000 < len(subject.occluder.faces)
+    assert 6_000 < view["triangles"] <= 16_000 < len(subject.occluder.faces)
     assert view["sigma_median_mm"] == pytest.approx(design.quality.sigma_median_mm)
     drawn = visit.page.evaluate(
         "document.getElementById('rig-3d').data.filter(t => t.type === 'mesh3d').map(t => t.name)"
@@ -260,6 +255,23 @@ def test_a_browser_draws_it(
     assert visit.page.evaluate("!!document.querySelector('#rig-3d canvas').getContext('webgl')")
     shot = visit.page.locator("#rig-3d").screenshot()
     assert len(shot) > 20_000, "an empty canvas compresses to a few kilobytes"
+
+
+@pytest.mark.needs_browser
+@pytest.mark.slow
+def test_without_webgl_still_pictures_stand_in_for_the_scenes(page: str, tmp_path: Path) -> None:
+    path = tmp_path / "report.html"
+    path.write_text(page, encoding="utf-8")
+    with chromium("--disable-gpu", "--disable-webgl", "--disable-webgl2") as browser:
+        visit = Visit(browser, path, "light", 1280)
+        assert visit.page.evaluate("document.body.dataset.ready") == "yes"
+        assert visit.faults == []
+        assert visit.view["figures"] == 3, "the maps need no WebGL"
+        assert visit.page.locator("#rig-3d").is_hidden()
+        stills = visit.page.locator("img.still")
+        assert [still.is_visible() for still in stills.all()] == [True] * 3
+        assert all(stills.evaluate_all("all => all.map((one) => one.naturalWidth > 0)"))
+        assert len(stills.first.screenshot()) > 20_000, "an empty picture packs to a few kilobytes"
 
 
 @pytest.mark.needs_browser
