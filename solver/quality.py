@@ -81,24 +81,14 @@ def evaluate(
     ``anchor`` are the poses about which Eq 8 bounds the cameras; without it those bounds are
     not judged. Raises :class:`InputError` when there are no cameras or two share a name.
     """
-    if not cameras:
-        raise InputError(
-            "no-cameras", "there are no cameras to evaluate", "give at least one camera"
-        )
-    names = [c.name for c in cameras]
-    if len(set(names)) < len(names):
-        raise InputError(
-            "camera-names", "two cameras have the same name", "give every camera its own name"
-        )
+    _must_be_named(cameras)
     problem = Problem(subject, cameras, limits, anchor)
     found = [Observations.of(problem, position) for position in problem.visibility_positions]
     rest = found[0]
     points = _points(problem, rest)
     seen = int(rest.visible.sum())
     coverage = _coverage(problem, found)
-    positions = zip(problem.visibility_positions, found, strict=True)
-    matchable = tuple(matchable_views(problem, position, f) for position, f in positions)
-    judged = Matchable(subject, limits, matchable)
+    judged = _matchable(problem, found)
     return Quality(
         cost_mm2=float(points.norm_mm2.mean()),
         sigma_median_mm=float(np.median(points.sigma_mm)),
@@ -117,6 +107,40 @@ def evaluate(
         ),
         matchable=judged,
     )
+
+
+def keeps_limits(subject: Subject, cameras: tuple[RigCamera, ...], limits: Limits) -> bool:
+    """Whether a network is feasible, as :func:`evaluate` says, without the figures of its points.
+
+    For many trials of one rig: it takes about two thirds of the time.
+    """
+    _must_be_named(cameras)
+    problem = Problem(subject, cameras, limits)
+    found = [Observations.of(problem, position) for position in problem.visibility_positions]
+    table = constraint_table(problem, [f.visible for f in found], _coverage(problem, found))
+    if not all(row.satisfied for row in table):
+        return False
+    if not limits.matching.demanded:
+        return True
+    return all(row.satisfied for row in _matching_rows(_matchable(problem, found)))
+
+
+def _must_be_named(cameras: tuple[RigCamera, ...]) -> None:
+    if not cameras:
+        raise InputError(
+            "no-cameras", "there are no cameras to evaluate", "give at least one camera"
+        )
+    names = [c.name for c in cameras]
+    if len(set(names)) < len(names):
+        raise InputError(
+            "camera-names", "two cameras have the same name", "give every camera its own name"
+        )
+
+
+def _matchable(problem: Problem, found: list[Observations]) -> Matchable:
+    positions = zip(problem.visibility_positions, found, strict=True)
+    views = tuple(matchable_views(problem, position, f) for position, f in positions)
+    return Matchable(problem.subject, problem.limits, views)
 
 
 def _matching_rows(matchable: Matchable) -> tuple[ConstraintRow, ...]:

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
-from geometry.arrays import Floats
+from geometry.arrays import Floats, frozen
 from geometry.camera import Body
 
 _CELL_MM = 30.0
 """Edge of the cells a body is cut into: smaller cells hug it closer but cost more rows."""
 
 
+@lru_cache(maxsize=64)
 def sphere_cover(body: Body) -> tuple[Floats, Floats]:
     """Centres (m, 3) in the camera frame and radii (m,), mm, of spheres that contain the body.
 
@@ -32,4 +35,4 @@ def sphere_cover(body: Body) -> tuple[Floats, Floats]:
         z = body.front_z_mm + (np.arange(slices) + 0.5) * step
         centres.append(np.stack([np.zeros(slices), np.zeros(slices), z], axis=1))
         radii.append(np.full(slices, float(np.hypot(body.lens_diameter_mm, step)) / 2.0))
-    return np.concatenate(centres), np.concatenate(radii)
+    return frozen(np.concatenate(centres)), frozen(np.concatenate(radii))

@@ -13,7 +13,7 @@ ROOT = Path(__file__).resolve().parents[1]
 ALLOW_NO_SKIP = "TESTS_ALLOW_NO_SKIP"
 PROVIDED = (
     "needs_browser", "needs_avr", "needs_aravis", "needs_genicam", "needs_gphoto2",
-    "needs_cloudcompare",
+    "needs_cloudcompare", "needs_slicer",
 )  # fmt: skip
 """Marks of tests whose needs .ci/packages.txt or the development extras provide."""
 

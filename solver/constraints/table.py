@@ -22,7 +22,7 @@ from solver.constraints.candidates import CandidateConstraints
 from solver.limits import ROLL_TOLERANCE_DEG
 from solver.problem import Problem
 from solver.result import ConstraintRow, CoverageShare, Sense
-from solver.variables import PER_CAMERA
+from solver.variables import PER_CAMERA, NetworkState
 
 SATISFIED = 1e-6
 """Relative violation up to which a limit counts as met: what the solver leaves by rounding."""
@@ -71,7 +71,7 @@ def constraint_table(
     rows += _rolls(problem)
     rows += _means(problem)
     for candidates in position_constraints(problem, state) + body_constraints(problem, state):
-        rows += _of_block(problem, candidates)
+        rows += _of_block(problem, state, candidates)
     rows += _of_coverage(problem, coverage)
     rows += _of_bounds(problem)
     return tuple(rows)
@@ -176,10 +176,11 @@ def _subjects(columns: bytes, width: int) -> tuple[tuple[int, ...], ...]:
     return tuple(tuple(dict.fromkeys(line)) for line in cameras.tolist())
 
 
-def _of_block(problem: Problem, candidates: CandidateConstraints) -> Iterator[ConstraintRow]:
+def _of_block(
+    problem: Problem, state: NetworkState, candidates: CandidateConstraints
+) -> Iterator[ConstraintRow]:
     """Rows of places and bodies, the worst of each camera or pair."""
     block = candidates.block
-    state = problem.unknowns.state(problem.start_values())
     value = block.value(state)
     slack = np.minimum(value - block.lower, block.upper - value)
     if isinstance(block, WeightedSum):

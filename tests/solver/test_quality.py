@@ -18,6 +18,7 @@ from geometry.raycast import Occluder
 from geometry.subject import Subject
 from geometry.surface import SurfacePoints
 from solver.limits import Coverage, CoverageTier, Incidence, Limits, MotionBox
+from solver.matching import Matching
 from solver.motion import rest
 from solver.problem import Problem
 from solver.quality import (
@@ -26,6 +27,7 @@ from solver.quality import (
     convergence_table,
     evaluate,
     is_sharp,
+    keeps_limits,
     nearest_body_mm,
 )
 from solver.result import Quality
@@ -53,6 +55,26 @@ def network() -> tuple[Subject, tuple[RigCamera, ...], Quality]:
     )
     found = tuple(cameras)
     return subject, found, evaluate(subject, found, rigs.face_limits())
+
+
+@pytest.mark.parametrize(
+    ("changes", "broken"),
+    [
+        ({}, set()),
+        ({"coverage": Coverage((CoverageTier(4, 0.9),))}, {"coverage_4"}),
+        ({"gsd_max_mm": 0.01}, {"gsd"}),
+        ({"matching": Matching(max_angle_deg=1.0, required=True)}, {"groups", "matchable_1"}),
+        ({"matching": Matching(max_angle_deg=1.0)}, set()),
+    ],
+)
+def test_whether_limits_are_kept_is_what_the_whole_evaluation_says(
+    changes: dict[str, object], broken: set[str]
+) -> None:
+    subject, cameras, _ = network()
+    limits = replace(OFF, **({"coverage": Coverage(())} | changes))  # type: ignore[arg-type]
+    whole = evaluate(subject, cameras, limits)
+    assert {row.family for row in whole.violated} == broken
+    assert keeps_limits(subject, cameras, limits) == whole.feasible == (not broken)
 
 
 def seen_by_hand(subject: Subject, camera: RigCamera) -> np.ndarray:

@@ -20,12 +20,12 @@ from rig.build.mounts.steps import assembly_steps
 from rig.build.mounts.surroundings import SEAT_HEIGHT_MM, Surroundings, Zone, head_entry
 from rig.build.mounts.systems.base import Holding, MountSystem
 from rig.build.mounts.tolerancing import Tolerancer, trials_for, yield_share
-from rig.build.statics.sag import Masses
 from rig.build.statics.stiffening import Stiffened, settled_sags, stiffened
+from rig.build.statics.weights import Masses
 from rig.catalogue import load_catalogue
 from rig.catalogue.items import Profile
 from solver.limits import Limits
-from solver.quality import evaluate
+from solver.quality import evaluate, keeps_limits
 from solver.result import Quality
 
 
@@ -241,7 +241,7 @@ def make_plan(
     job.tell("trials", 0.9)
     count = trials_for(len(cameras)) if trials is None else trials
     share = yield_share(
-        lambda tried: evaluate(subject, tried, limits).feasible, job.network(built.mounts),
+        lambda tried: keeps_limits(subject, tried, limits), job.network(built.mounts),
         built.mounts, seed=seed, trials=count, cancel=job.cancel,
     )  # fmt: skip
     job.tell("done", 1.0)

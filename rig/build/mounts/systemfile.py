@@ -31,7 +31,7 @@ from rig.build.mounts.systems.parts import (
 from rig.build.mounts.systems.threads import adapter_for
 from rig.build.mounts.systems.tripods import TripodSystem
 from rig.build.mounts.systems.tslot import TSlotSystem
-from rig.build.statics.sag import Masses
+from rig.build.statics.weights import Masses
 from rig.catalogue import Catalogue, load_catalogue
 from rig.catalogue.items import Profile
 

@@ -2,7 +2,7 @@
 
 Written here rather than taken from a library: the one that is well kept, PyNiteFEA, brings
 matplotlib along and solves one load at a time. On the frame of a plan for seven cameras the two
-agree to 0.03 micrometres of 17 mm.
+agree to 0.03 micrometres of 17 mm; a test holds three whole rigs to it.
 """
 
 from __future__ import annotations

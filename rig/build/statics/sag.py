@@ -3,22 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import ConvexHull
 
 from geometry.arrays import Floats
-from geometry.camera import RigCamera
 from rig.build.mounts.plan import Give, Sag, Tolerance
 from rig.build.mounts.settings import CameraMount, rig_from_camera
 from rig.build.mounts.solids import lens_front
 from rig.build.mounts.structure import Structure
 from rig.build.mounts.tolerancing import half_step
-from rig.build.parts.bill import PRINT_DENSITY_G_PER_CM3
 from rig.build.statics.beams import FREEDOMS
 from rig.build.statics.framing import StructureFrame, frame_of
-from rig.catalogue import Catalogue
+from rig.build.statics.weights import Masses, weights
 
 GRAVITY_M_S2 = np.array([0.0, 0.0, -9.81])
 TOUCH_N = 5.0
@@ -30,31 +26,6 @@ LEVER_MM = 300.0
 PROBE = 1e-3
 LEVELLED_FROM = 3
 """Fewer cameras than this have no motion in common that a stand could be set right by."""
-
-
-@dataclass(frozen=True)
-class Masses:
-    """What hangs on a structure. ``camera_kg``: of a camera whose mass the catalogue lacks."""
-
-    catalogue: Catalogue
-    camera_kg: float = 0.5
-
-    def of_camera(self, camera: RigCamera) -> float:
-        """A camera with its lens, kg."""
-        known = self.published(camera)
-        return self.camera_kg if known is None else known
-
-    def published(self, camera: RigCamera) -> float | None:
-        """The same as the catalogue has it; None where it does not say."""
-        parts = self.catalogue.parts_of(camera.camera.name)
-        known = [getattr(part, "mass_g", None) for part in parts or () if part.kind != "built-in"]
-        if not known or any(mass is None for mass in known):
-            return None
-        return sum(float(mass or 0.0) for mass in known) / 1e3
-
-    def of_part(self, part: str) -> float:
-        """A part of the catalogue, kg; 0 where nobody published it."""
-        return float(getattr(self.catalogue.find(part)[1], "mass_g", None) or 0.0) / 1e3
 
 
 def sags(
@@ -129,34 +100,13 @@ def _hung(
     holders: Mapping[str, int],
     masses: Masses,
 ) -> Floats:
-    """The weight of cameras, heads, plates under them, wedges, and what joints are made with."""
+    """The weight of all that hangs on members, as a load (N, 6)."""
     load = np.zeros((len(stood.places_mm), FREEDOMS))
-
-    def hang(node: int, at_mm: Floats, mass_kg: float) -> None:
-        load[:] += _force_at(stood, node, at_mm, mass_kg * GRAVITY_M_S2)
-
-    for mount in mounts:
-        body = mount.camera.camera.body.centre_camera_mm
-        hang(
-            holders[mount.name],
-            mount.camera.pose.to_rig(body[None])[0],
-            masses.of_camera(mount.camera),
-        )
-    for part in structure.parts:
-        held = next((n for (j, _), n in stood.node_of_joint.items() if j == part.joint), None)
-        node = holders.get(part.camera, held)
+    held = {joint: node for (joint, _), node in reversed(stood.node_of_joint.items())}
+    for weight in weights(structure, mounts, masses):
+        node = holders.get(weight.camera, held.get(weight.joint))
         if node is not None:
-            hang(node, part.rig_from_part[:3, 3], masses.of_part(part.part))
-    cameras = {wedge.id: wedge.camera for wedge in structure.wedges}
-    for solid in structure.solids:
-        if solid.kind == "wedge" and cameras.get(solid.owner) in holders:
-            mass = float(ConvexHull(solid.corners_mm).volume) * PRINT_DENSITY_G_PER_CM3 * 1e-6
-            hang(holders[cameras[solid.owner]], solid.corners_mm.mean(axis=0), mass)
-    for joint in structure.joints:
-        node = stood.node_of_joint.get((joint.id, joint.on))
-        if node is not None:
-            mass = sum(masses.of_part(part) * n for part, n in joint.fasteners.items())
-            hang(node, stood.places_mm[node], mass)
+            load += _force_at(stood, node, weight.at_mm, weight.mass_kg * GRAVITY_M_S2)
     return load
 
 

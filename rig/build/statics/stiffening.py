@@ -11,7 +11,8 @@ from rig.build.mounts.settings import CameraMount
 from rig.build.mounts.structure import Structure
 from rig.build.mounts.surroundings import Surroundings
 from rig.build.mounts.systems.base import Built, Holding, MountSystem
-from rig.build.statics.sag import Masses, sags
+from rig.build.statics.sag import sags
+from rig.build.statics.weights import Masses
 from rig.catalogue.items import Profile
 
 ROOM = 0.7

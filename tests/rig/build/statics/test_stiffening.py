@@ -18,8 +18,9 @@ from rig.build.mounts.plan import Give, MountPlan, Sag
 from rig.build.mounts.planfile import plan_document, plan_from_mapping
 from rig.build.mounts.systemfile import system_from_mapping
 from rig.build.page.stiffness import stiffness
-from rig.build.statics.sag import Masses, sags
+from rig.build.statics.sag import sags
 from rig.build.statics.stiffening import advice, settled_sags, stiffened
+from rig.build.statics.weights import Masses
 from rig.catalogue import load_catalogue
 
 CATALOGUE = load_catalogue()
