@@ -35,7 +35,9 @@ _SOLVED = 0.9
 _FINE = 2
 """How many networks of the search are optimised continuously."""
 
-_REFINEMENT_COST = 1.01
+_REFINEMENT_COST, _HOPELESS_COST = 1.01, 1.03
+"""A refinement may cost the first; beyond the second no more points are named to mend it."""
+
 _REFINEMENT_TRIES = 3
 _MOST_NAMED = 100
 
@@ -362,6 +364,7 @@ def _finish(
 
     A refinement that loses a point, or views of it that count, is repeated with that point named.
     """
+    why = result.why
     for _ in range(_REFINEMENT_TRIES):
         outcome = refine(problem, result, cancel)
         refined = evaluate(
@@ -371,6 +374,9 @@ def _finish(
         worth = refined.feasible and refined.cost_mm2 <= _REFINEMENT_COST * quality.cost_mm2
         if worth or _rank(refined) < _rank(quality):
             return outcome.values, refined, outcome.kkt_error, outcome.why, outcome.iterations
+        why = f"{result.why}; the last digits with each view held cost more than they give"
+        if refined.feasible and refined.cost_mm2 > _HOPELESS_COST * quality.cost_mm2:
+            break
         judged = judge(problem, problem.unknowns.state(outcome.values))
         result = replace(
             result,
@@ -379,7 +385,7 @@ def _finish(
             ),
             margins=result.margins.wider(judged.shortfall),
         )
-    return result.values, quality, optimality_error(problem, result), result.why, 0
+    return result.values, quality, optimality_error(problem, result), why, 0
 
 
 def _better_given(

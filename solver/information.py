@@ -36,6 +36,37 @@ def symmetric(entries: Floats) -> Floats:
     return full
 
 
+def covariance_norms(entries: Floats) -> Floats:
+    """Frobenius norms (...) of the inverses of symmetric matrices given by entries (..., 6).
+
+    The six are on the axis before the last: entries (..., 6, p) give (..., p). By the invariants
+    of the matrices, as ``sqrt(minors^2 - 2 trace determinant) / determinant``: a hundred thousand
+    3 x 3 inverses at a time have no use for pivots. The root loses no digits, for its argument is
+    at least a third of the square of the sum of the principal minors.
+    """
+    xx, yy, zz, xy, xz, yz = np.moveaxis(entries, -2, 0)
+    xy2, xz2, minor = xy * xy, xz * xz, yy * zz
+    minor -= yz * yz
+    determinant = xx * minor
+    determinant -= yy * xz2
+    determinant -= zz * xy2
+    mixed = 2.0 * xy
+    mixed *= xz
+    mixed *= yz
+    determinant += mixed
+    flat = yy + zz
+    trace = xx + flat
+    flat *= xx
+    minor += flat
+    minor -= xy2
+    minor -= xz2
+    minor *= minor
+    trace *= determinant
+    trace *= 2.0
+    minor -= trace
+    return np.asarray(np.sqrt(minor) / determinant)
+
+
 @dataclass(frozen=True, eq=False)
 class _Rays:
     """Quantities of all rays: d (3, n, p); z, d.d, weight (n, p)."""
@@ -91,6 +122,18 @@ def ray_information(state: NetworkState, points: Floats, weight: Floats) -> Floa
         out[:, row] = (axis[:, k] * axis[:, m])[:, None] * gamma - beta * own
     out[:, :3] += alpha[:, None]
     return out
+
+
+def loss_by_one_view(state: NetworkState, points: Floats, weight: Floats, prior: float) -> Floats:
+    """By how much the norm of each point's covariance would grow without its best view, (p,)."""
+    own = ray_information(state, points, weight)
+    entries = own.sum(axis=0)
+    entries[:3] += prior
+    with np.errstate(divide="ignore", invalid="ignore"):
+        # Without its only view a point has nothing but the prior, or what rounding leaves of it.
+        without = np.abs(covariance_norms(entries - own))
+    lost = np.where(weight > 0.0, np.nan_to_num(without, nan=np.inf), 0.0).max(axis=0)
+    return np.asarray(np.maximum(lost - covariance_norms(entries), 0.0))
 
 
 def normal_matrices(state: NetworkState, points: Floats, weight: Floats, prior: float) -> Floats:

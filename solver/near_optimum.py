@@ -43,7 +43,7 @@ from solver.formulation import (
     merit,
     unknown_bounds,
 )
-from solver.information import CovarianceCost
+from solver.information import CovarianceCost, loss_by_one_view
 from solver.nlp.program import NonlinearProgram
 from solver.nlp.sqp import Outcome, minimise
 from solver.outer_loop import Monitor, Report, StartResult
@@ -55,25 +55,29 @@ FIRST_BOX = 0.06
 
 LARGEST_BOX = 0.2
 SMALLEST_BOX = 0.004
-_MOST_WEAK = 200
+_MOST_WEAK = 50
+"""Points that are held on to, so few that they hardly weigh among the design points."""
+
 MAX_MOVES = 24
-_STEPS = 25
-_GAIN = 3e-4
+_STEPS, _LAST_STEPS = 25, 8
+_GAIN, _LAST_GAIN = 3e-4, 1e-5
 _SETTLED = 1e-3
 _MARGINS = Margins(0.01, 0.0)
 _VIOLATION, _SHORTFALL = 300.0, 3000.0
 """Weights of a violation (in length scales) and of a share of points, in units of the cost: well
 above the multipliers of limits that bind, which are of order ten."""
 
-_BROKEN, _MET = 0.05, 1e-7
-"""A network that breaks a limit at all is charged this; limits count as met within the other."""
+_BROKEN, _MET, _NEARLY_MET = 0.05, 1e-7, 1e-3
+"""A network that breaks a limit at all is charged the first; limits count as met within the second,
+and as all but met within the third."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Network:
     """A network with the rays that it really has.
 
-    The cost of ``merit`` is that of the check points; ``weak`` are those with few views.
+    The cost of ``merit`` is that of the check points; ``weak`` are those of them that losing one
+    view would hurt most.
     """
 
     values: Floats
@@ -127,11 +131,11 @@ def _checked(problem: Problem, values: Floats) -> tuple[float, Ints]:
     seen = cast_rays(source, problem.subject.occluder, eyes, limit, positions).seen
     for i, camera in enumerate(problem.placed(values)):
         seen[i] &= in_frame(camera, source.points_mm)
-    weight = seen * problem.ray_weight[:, None]
-    cost = CovarianceCost(problem.scaled(source.points_mm), weight, problem.prior).value(state)
-    count = seen.sum(axis=0)
-    weak = np.flatnonzero((count > 0) & (count <= FEW_VIEWS))
-    return cost, weak[:: max(1, len(weak) // _MOST_WEAK)]
+    weight, points = seen * problem.ray_weight[:, None], problem.scaled(source.points_mm)
+    cost = CovarianceCost(points, weight, problem.prior).value(state)
+    loss = loss_by_one_view(state, points, weight, problem.prior)
+    weak = np.sort(np.argsort(-loss, kind="stable")[:_MOST_WEAK])
+    return cost, weak[loss[weak] > 0.0]
 
 
 def _box(values: Floats, half: float, bounds: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
@@ -158,20 +162,32 @@ def _moved(
     seen = replace(seen, framed=seen.framed | held.framed)
     rows = candidate_constraints(problem, state, seen)
     rows += cut_constraints(problem, held.cuts.of(seen.assigned))
+    program = NonlinearProgram(
+        problem.unknowns,
+        covariance_cost(problem, seen, scale),
+        rows,
+        _box(best.values, half, bounds),
+        COVERAGE,
+    )
     outcome = minimise(
-        NonlinearProgram(
-            problem.unknowns,
-            covariance_cost(problem, seen, scale),
-            rows,
-            _box(best.values, half, bounds),
-            COVERAGE,
-        ),
+        program,
         best.values,
         monitor.watch,
         gain_tolerance=_GAIN,
         radius=half,
         max_iterations=_STEPS,
     )
+    if _MET < outcome.violation < _NEARLY_MET:
+        # Limits that are all but met are worth a few steps more: a move that breaks one is lost.
+        outcome = minimise(
+            program,
+            outcome.values,
+            monitor.watch,
+            gain_tolerance=_LAST_GAIN,
+            known=outcome.multipliers,
+            radius=0.1 * half,
+            max_iterations=_LAST_STEPS,
+        )
     monitor.steps += outcome.iterations
     opening = opening_directions(problem, state, seen.assigned)
     after = problem.unknowns.state(outcome.values)

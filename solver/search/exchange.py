@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,16 +16,25 @@ from solver.limits import Limits
 from solver.search.candidates import Candidates, candidates, directions_about
 from solver.search.networks import Search
 
-SHAKES = 80
-"""Shakes of a network of the whole grid; more find hardly anything better on a head."""
+CHAINS = 4
+"""Networks grown apart: a chain of shakes ends near where it begins, and which of them ends best
+is chance."""
 
-FINER_DEG = (2.0, 0.8)
-"""Steps of the rings of candidates about the best networks so far, one look after the other."""
+SHAKES = 160
+"""Shakes of networks of the whole grid, all chains together."""
 
-FINER_SHAKES = 30
+FINER = ((2.0, 32), (0.8, 16))
+"""Steps in degrees of the rings of candidates about the cameras of the best networks so far, and
+how many cameras that is at most, but two networks: one look after the other."""
+
+FINER_SHAKES = 40
+_FULL_EFFORT = 9
+"""Cameras up to which networks are shaken so often: a shake takes as much longer as there are more,
+so of more cameras there are fewer."""
+
 _TAKEN_OUT = 3
 _BEST_OF = 12
-_KEPT = 4
+_KEPT = 8
 _APART = 2
 """Networks kept beside each other differ in so many cameras: others end at the same optimum."""
 
@@ -48,15 +57,17 @@ def search_networks(
         pool = candidates(subject, camera, limits, fixed, cancel)
         if pool.free < len(names):
             return []
-        found = exchange(Search(pool, limits), len(names), seed, cancel, SHAKES)
-        for step_deg in FINER_DEG if found[0].score[0] == 0 else ():
-            outward = [pool.position_mm[_free(pool, f.network)] - middle for f in found]
+        found = exchange(Search(pool, limits), len(names), seed, cancel, _shakes(SHAKES, names))
+        for step_deg, most in FINER if found[0].score[0] == 0 else ():
+            some = found[: max(2, most // len(names))]
+            outward = [pool.position_mm[_free(pool, f.network)] - middle for f in some]
             outward = [o / np.linalg.norm(o, axis=1, keepdims=True) for o in outward]
             near = directions_about(np.unique(np.concatenate(outward), axis=0), step_deg)
             pool = candidates(subject, camera, limits, fixed, cancel, outward=near)
             search = Search(pool, limits)
             starts = [_nearest(search, o, middle) for o in outward]
-            found = exchange(search, len(names), seed, cancel, FINER_SHAKES, starts)
+            shakes = _shakes(FINER_SHAKES, names)
+            found = exchange(search, len(names), seed, cancel, shakes, starts)
     return [
         tuple(
             replace(pool.cameras[k], name=n)
@@ -65,6 +76,10 @@ def search_networks(
         for f in found
         if f.score[0] == 0
     ]
+
+
+def _shakes(most: int, names: tuple[str, ...]) -> int:
+    return most * _FULL_EFFORT // max(_FULL_EFFORT, len(names))
 
 
 def _free(pool: Candidates, network: Ints) -> Ints:
@@ -97,24 +112,42 @@ def exchange(
 ) -> list[Found]:
     """Networks of ``count`` free cameras, the best first, no two alike in all but one camera.
 
-    Begins with the best of ``starts`` and of the network grown by the view that helps most. A
-    shake takes some cameras out, puts others in their places, each one of the best dozen by
-    chance, and exchanges until nothing helps; what is better is kept and shaken on. The same
-    seed gives the same networks.
+    A chain begins with each of ``starts``; without any, one with the network grown by the view
+    that helps most, others with every camera of it put elsewhere. A shake takes some cameras out,
+    puts others in their places, each one of the best dozen by chance, and exchanges until nothing
+    helps; what is better is kept and shaken on. ``shakes`` of all chains together. The same seed
+    gives the same networks.
     """
-    rng = np.random.default_rng(seed)
-    begun = [search.exchanged(n) for n in (search.grown(search.fixed, count), *starts)]
-    kept = {tuple(sorted(n.tolist())): Found(n, search.score(n)) for n in begun}
-    best, score = min(((f.network, f.score) for f in kept.values()), key=lambda pair: pair[1])
+    chains = len(starts) or CHAINS
+    grown = None if starts else search.grown(search.fixed, count)
+    kept: dict[tuple[int, ...], Found] = {}
+    for chain in range(chains):
+        if kept and cancel.is_set():
+            break
+        rng = np.random.default_rng([seed, chain])
+        begin = starts[chain] if grown is None else grown
+        if grown is not None and chain > 0:
+            begin = _shaken(search, grown, rng, count)
+        for found in _chain(search, begin, rng, cancel, -(-shakes // chains)):
+            kept[tuple(sorted(found.network.tolist()))] = found
+    return _apart(sorted(kept.values(), key=lambda f: f.score))
+
+
+def _chain(
+    search: Search, begin: Ints, rng: np.random.Generator, cancel: CancelToken, shakes: int
+) -> Iterator[Found]:
+    """The networks of one chain of shakes."""
+    network = search.exchanged(begin)
+    best = Found(network, search.score(network))
+    yield best
     for _ in range(shakes):
         if cancel.is_set():
             break
-        trial = search.exchanged(_shaken(search, best, rng))
-        found = search.score(trial)
-        kept[tuple(sorted(trial.tolist()))] = Found(trial, found)
-        if found < score:
-            best, score = trial, found
-    return _apart(sorted(kept.values(), key=lambda f: f.score))
+        trial = search.exchanged(_shaken(search, best.network, rng))
+        found = Found(trial, search.score(trial))
+        yield found
+        if found.score < best.score:
+            best = found
 
 
 def _apart(found: list[Found]) -> list[Found]:
@@ -128,10 +161,12 @@ def _apart(found: list[Found]) -> list[Found]:
     return out
 
 
-def _shaken(search: Search, network: Ints, rng: np.random.Generator) -> Ints:
-    """A network with some of its free cameras put elsewhere."""
+def _shaken(
+    search: Search, network: Ints, rng: np.random.Generator, count: int = _TAKEN_OUT
+) -> Ints:
+    """A network with so many of its free cameras put elsewhere."""
     free = np.flatnonzero(network < search.candidates.free)
-    out = rng.choice(free, min(_TAKEN_OUT, len(free)), replace=False)
+    out = rng.choice(free, min(count, len(free)), replace=False)
     rest = np.delete(network, out)
     for _ in out:
         broken, cost = search.scores_with_each(rest, _BEST_OF)

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from geometry.arrays import Bools, Floats, Ints
+from solver.information import covariance_norms
 from solver.limits import Limits
 from solver.search.candidates import Candidates
 from solver.search.sight import in_each_others_view
@@ -17,20 +18,6 @@ _AT_A_TIME = 24
 
 _COVERAGE_WEIGHT = 30.0
 """A share of points that lack views costs this much times that share, in units of the cost."""
-
-
-def covariance_norms(entries: Floats) -> Floats:
-    """Frobenius norms (...) of the inverses of symmetric matrices given by entries (..., 6).
-
-    The six are on the axis before the last: entries (..., 6, p) give (..., p). By cofactors:
-    a hundred thousand 3 x 3 inverses at a time have no use for pivots.
-    """
-    xx, yy, zz, xy, xz, yz = np.moveaxis(entries, -2, 0)
-    a, b, c = yy * zz - yz * yz, xx * zz - xz * xz, xx * yy - xy * xy
-    d, e, f = xz * yz - xy * zz, xy * yz - xz * yy, xy * xz - yz * xx
-    determinant = xx * a + xy * d + xz * e
-    size = a * a + b * b + c * c + 2.0 * (d * d + e * e + f * f)
-    return np.asarray(np.sqrt(size) / determinant)
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,9 +110,23 @@ class Search:
             lack = np.maximum(lack, tier.share - (count >= tier.views) @ self.candidates.share)
         return np.asarray(1.0 + _COVERAGE_WEIGHT * lack)
 
-    def best_addition(self, rest: Ints) -> int:
-        """The free candidate that helps a network most."""
-        return _least(*self.scores_with_each(rest), self.candidates.free)
+    def best_addition(self, rest: Ints) -> tuple[int, tuple[int, float]]:
+        """The free candidate that helps a network most, and the score with it.
+
+        Networks that are shaken come back to where they were, so what was found is kept.
+        """
+        rest = np.sort(rest)
+        known = self._best_additions.get(rest.tobytes())
+        if known is None:
+            broken, cost = self.scores_with_each(rest)
+            at = _least(broken, cost, self.candidates.free)
+            known = at, (int(broken[at]), float(cost[at]))
+            self._best_additions[rest.tobytes()] = known
+        return known
+
+    @cached_property
+    def _best_additions(self) -> dict[bytes, tuple[int, tuple[int, float]]]:
+        return {}
 
     @property
     def fixed(self) -> Ints:
@@ -136,7 +137,7 @@ class Search:
     def grown(self, network: Ints, count: int) -> Ints:
         """A network grown to ``count`` free cameras, each time by the view that helps most."""
         while len(network) < count + self.candidates.fixed:
-            network = np.append(network, self.best_addition(network))
+            network = np.append(network, self.best_addition(network)[0])
         return network
 
     def exchanged(self, network: Ints, passes: int = 12) -> Ints:
@@ -147,10 +148,7 @@ class Search:
         for _ in range(passes):
             moved = False
             for k in np.flatnonzero(network < free_candidates):
-                rest = np.delete(network, k)
-                broken, cost = self.scores_with_each(rest)
-                at = _least(broken, cost, free_candidates)
-                found = int(broken[at]), float(cost[at])
+                at, found = self.best_addition(np.delete(network, k))
                 if found < (best[0], best[1] * (1.0 - 1e-9)):
                     network[k], best, moved = at, found, True
             if not moved:

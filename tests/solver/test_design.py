@@ -43,7 +43,7 @@ def coarser_candidates() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(exchange, "SHAKES", 10)
         patch.setattr(exchange, "FINER_SHAKES", 5)
-        patch.setattr(exchange, "FINER_DEG", (3.0,))
+        patch.setattr(exchange, "FINER", ((3.0, 20),))
         patch.setattr(exchange, "candidates", partial(candidates, step_deg=10.0))
         yield
 

@@ -33,7 +33,7 @@ def coarser_candidates() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module, "SHAKES", 6)
         patch.setattr(module, "FINER_SHAKES", 3)
-        patch.setattr(module, "FINER_DEG", (5.0,))
+        patch.setattr(module, "FINER", ((5.0, 12),))
         patch.setattr(module, "candidates", partial(candidates, step_deg=14.0))
         yield
 
@@ -71,7 +71,7 @@ def pool(seed: int, count: int = 25) -> Candidates:
 
 def test_networks_are_complete_named_in_order_and_different() -> None:
     found = networks()
-    assert 1 <= len(found) <= 4
+    assert 1 <= len(found) <= 8
     for network in found:
         assert tuple(c.name for c in network) == rigs.names(3)
     places = {tuple(c.pose.position_rig_mm.tobytes() for c in n) for n in found}
@@ -100,7 +100,7 @@ def test_the_same_seed_gives_the_same_networks() -> None:
 
 
 def test_a_finer_look_about_the_networks_never_ends_worse(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "FINER_DEG", ())
+    monkeypatch.setattr(module, "FINER", ())
     coarse = search_networks(
         rigs.face(30, 60), rigs.compact_camera(), LIMITS, rigs.names(3), (), 0, NEVER
     )
@@ -117,6 +117,32 @@ def test_networks_kept_beside_each_other_differ_in_two_cameras() -> None:
     assert len(found) > 1
     for one, other in combinations(found, 2):
         assert len(set(one.network.tolist()) - set(other.network.tolist())) >= 2
+
+
+def test_many_cameras_are_shaken_less_often() -> None:
+    assert [module._shakes(160, rigs.names(n)) for n in (4, 9, 18, 24)] == [160, 160, 80, 60]
+
+
+def test_chains_that_begin_apart_find_what_one_does_not(monkeypatch: pytest.MonkeyPatch) -> None:
+    alone: list[float] = []
+    together: list[float] = []
+    for seed in range(6):
+        search = Search(pool(seed), Limits(body_clearance_mm=None, sight_line_clearance_mm=None))
+        monkeypatch.setattr(module, "CHAINS", 1)
+        alone.append(exchange(search, 3, seed, NEVER, shakes=0)[0].score[1])
+        monkeypatch.setattr(module, "CHAINS", 4)
+        together.append(exchange(search, 3, seed, NEVER, shakes=0)[0].score[1])
+    # Sums in another order differ in the last digits.
+    gains = [one / many - 1.0 for one, many in zip(alone, together, strict=True)]
+    assert min(gains) > -1e-12
+    assert max(gains) > 1e-6
+
+
+def test_what_helps_a_network_most_is_weighed_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    search = Search(pool(3), Limits(body_clearance_mm=None, sight_line_clearance_mm=None))
+    first = search.best_addition(np.array([4, 1, 7]))
+    monkeypatch.setattr(Search, "scores_with_each", None)
+    assert search.best_addition(np.array([7, 4, 1])) == first
 
 
 def test_the_exchange_is_never_worse_than_a_network_it_is_given() -> None:

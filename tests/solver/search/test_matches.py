@@ -129,6 +129,6 @@ def test_what_lacks_is_named_among_the_conflicts() -> None:
     limits = replace(FREE, matching=strict)
     cameras = rigs.face_cameras(rigs.face(30, 120), 3, limits)
     problem = Problem(rigs.face(30, 120), cameras, limits)
-    named = {c.family: c.amount for c in _coverage(problem, problem.start_values())}
+    named = {c.family: c.amount for c in _coverage(problem, problem.start_values(), set())}
     assert named["groups"] == 2.0
     assert named["matchable_1"] == pytest.approx(TIERS[0].share)

@@ -13,7 +13,7 @@ import rigs
 
 from common.errors import CancelledError
 from common.progress import NeverCancelled
-from solver.information import normal_matrices
+from solver.information import covariance_norms, normal_matrices
 from solver.limits import BaseHeight, Coverage, CoverageTier, HalfSpace, StandOff, Zones
 from solver.problem import Problem
 from solver.quality import evaluate
@@ -28,7 +28,7 @@ from solver.search.candidates import (
     directions_about,
 )
 from solver.search.exchange import exchange
-from solver.search.networks import Search, covariance_norms
+from solver.search.networks import Search
 
 STEP_DEG = 12.0
 """Coarser than the search's own, for speed."""
