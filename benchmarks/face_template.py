@@ -26,7 +26,7 @@ _MOST_TURN_DEG = 76.0
 _STEEP_MM = 85.0
 _PEOPLE = 800
 _BUNDLED = 60
-_MODES = 32
+_MODES = 96
 _RIG_FROM_MODEL = 10.0 * np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 
 
