@@ -102,6 +102,19 @@ class PlanSag(Result):
     ]
 
 
+class PlanStance(Result):
+    """How something that stands by itself resists a level push at the height of the head."""
+
+    on: Annotated[list[str], Field(description="Its feet.")]
+    mass_kg: Figure
+    height_mm: Annotated[Figure, Field(description="Of the push, over the floor.")]
+    push_n: Annotated[Figure, Field(description="The push that it is to withstand.")]
+    tips_n: Annotated[
+        Figure, Field(description="The push that tips it; negative: it falls by itself.")
+    ]
+    too_little: Annotated[str, Field(description="That it tips, in words; empty where not.")]
+
+
 class PlanResult(Result):
     """A plan in short; its files hold the rest."""
 
@@ -110,7 +123,8 @@ class PlanResult(Result):
     buildable: Annotated[
         bool,
         Field(
-            description="Whether nothing clashes and no camera leans beyond what the design allows."
+            description="Whether nothing clashes, no camera leans beyond what the design allows, "
+            "and nothing tips over when it is pushed."
         ),
     ]
     clashes: list[PlanClash]
@@ -132,6 +146,9 @@ class PlanResult(Result):
     notes: list[str]
     sags: list[PlanSag] = Field(
         default_factory=list, description="How each camera gives way under the rig's own weight."
+    )
+    stances: list[PlanStance] = Field(
+        default_factory=list, description="How what stands by itself resists tipping."
     )
 
 

@@ -11,7 +11,7 @@ from geometry.reading import read_scan
 from rig.build.folder.planfiles import PlanOptions
 from rig.build.folder.planfolder import write_plan
 from rig.build.mounts.making import make_plan
-from rig.build.mounts.plan import Clash, Figures, MountPlan, Price, Sag, Tolerance
+from rig.build.mounts.plan import Clash, Figures, MountPlan, Price, Sag, Stance, Tolerance
 from rig.build.mounts.settings import CameraMount
 from rig.build.parts import Prices, Stock, must_be_known
 from rig.catalogue import load_catalogue
@@ -26,6 +26,7 @@ from service.kinds.plan import (
     PlanResult,
     PlanSag,
     PlanSetting,
+    PlanStance,
     PlanTolerance,
 )
 
@@ -93,6 +94,7 @@ def in_short(made: MountPlan) -> PlanResult:
         steps=list(made.steps),
         notes=list(made.notes),
         sags=[_sag(sag) for sag in made.sags],
+        stances=[_stance(stance) for stance in made.stances],
     )
 
 
@@ -104,6 +106,17 @@ def _sag(sag: Sag) -> PlanSag:
         touched_mm=float(sag.touched_mm),
         touched_deg=float(sag.touched_deg),
         too_far=sag.words if sag.worst.share > 1.0 else "",
+    )
+
+
+def _stance(stance: Stance) -> PlanStance:
+    return PlanStance(
+        on=list(stance.on),
+        mass_kg=float(stance.mass_kg),
+        height_mm=float(stance.height_mm),
+        push_n=float(stance.push_n),
+        tips_n=float(stance.tips_n),
+        too_little="" if stance.stands else stance.words,
     )
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from plans import tslot_plan
 
-from rig.build.mounts.plan import Clash, Give, Sag
+from rig.build.mounts.plan import Clash, Give, Sag, Stance
 from service.cli.commands.plan import caution, why_not
 from service.kinds.plan import PlanClash, PlanNetwork, PlanPrice, PlanResult
 from service.tasks.planning import in_short
@@ -90,3 +90,12 @@ def test_a_rig_that_leans_too_far_is_not_buildable(off_deg: float, sound: bool) 
     assert short.buildable == sound and bool(short.sags[0].too_far) != sound
     hit = Clash("solid", "a", "b", -1.0, 2.0)
     assert not in_short(replace(made, clashes=(hit,))).buildable
+
+
+@pytest.mark.parametrize(("tips_n", "sound"), [(26.0, True), (11.0, False), (-3.0, False)])
+def test_a_rig_that_tips_over_is_not_buildable(tips_n: float, sound: bool) -> None:
+    way = np.array([0.0, 1.0])
+    stance = Stance(("left foot",), 10.0, np.zeros(3), 1200.0, 20.0, tips_n, "away", way)
+    short = in_short(replace(tslot_plan(2), clashes=(), stances=(stance,)))
+    assert short.buildable == sound
+    assert ("left foot is tipped away" in caution(short)) != sound

@@ -20,6 +20,7 @@ from rig.build.mounts.steps import assembly_steps
 from rig.build.mounts.surroundings import SEAT_HEIGHT_MM, Surroundings, Zone, head_entry
 from rig.build.mounts.systems.base import Holding, MountSystem
 from rig.build.mounts.tolerancing import Tolerancer, trials_for, yield_share
+from rig.build.statics.steadying import settled_stances, steadied
 from rig.build.statics.stiffening import Stiffened, settled_sags, stiffened
 from rig.build.statics.weights import Masses
 from rig.catalogue import load_catalogue
@@ -120,10 +121,11 @@ class _Job:
     def stiff(
         self, spec: SystemSpec, cameras: tuple[RigCamera, ...], around: Surroundings
     ) -> Stiffened:
-        """The system with what it needs so that its cameras do not lean, as first arranged."""
+        """The system with what it needs neither to lean nor to tip over, as first arranged."""
         if not spec.stiffen:
             return Stiffened(spec.system, spec.system.hold(cameras, around))
-        return stiffened(spec.system, spec.larger, cameras, around, spec.masses)
+        stiff = stiffened(spec.system, spec.larger, cameras, around, spec.masses)
+        return steadied(stiff, cameras, around, spec.masses)
 
     def rounded(self, holding: Holding, spare: float) -> tuple[CameraMount, ...]:
         """Settings that exist; those of before where all do."""
@@ -238,6 +240,7 @@ def make_plan(
     )  # fmt: skip
     tolerances = tolerancer.each()
     found, unknown = settled_sags(built.structure, built.mounts, tolerances, spec.masses)
+    stand, tips = settled_stances(built.structure, built.mounts, around.datum_mm, spec.masses)
     job.tell("trials", 0.9)
     count = trials_for(len(cameras)) if trials is None else trials
     share = yield_share(
@@ -257,6 +260,7 @@ def make_plan(
         yield_share=share,
         yield_trials=count,
         steps=assembly_steps(built.structure, built.mounts),
-        notes=(*built.notes, *stiff.notes, *unknown),
+        notes=(*built.notes, *stiff.notes, *unknown, *tips),
         sags=found,
+        stances=stand,
     )

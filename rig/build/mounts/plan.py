@@ -10,6 +10,8 @@ from geometry.arrays import Floats, frozen
 from rig.build.mounts.settings import CameraMount
 from rig.build.mounts.structure import Structure
 
+GRAVITY_M_S2 = 9.81
+
 
 @dataclass(frozen=True)
 class Figures:
@@ -145,13 +147,58 @@ class Sag:
 
 
 @dataclass(frozen=True, eq=False)
+class Stance:
+    """How one part of a structure that stands by itself resists tipping.
+
+    ``on`` names its feet, ``centre_mm`` (3,) is its centre of mass in the rig frame. A level push
+    at ``height_mm`` over the floor, along ``way`` (2,) in the rig's x and y, tips it from
+    ``tips_n`` on, negative for what falls over by itself; it is to withstand ``push_n``.
+    ``toward``: the way in words.
+    """
+
+    on: tuple[str, ...]
+    mass_kg: float
+    centre_mm: Floats
+    height_mm: float
+    push_n: float
+    tips_n: float
+    toward: str
+    way: Floats
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "centre_mm", frozen(self.centre_mm))
+        object.__setattr__(self, "way", frozen(self.way))
+
+    @property
+    def lacks_mm(self) -> float:
+        """By how much its foot would have to reach farther that way to withstand the push."""
+        weight_n = self.mass_kg * GRAVITY_M_S2
+        return max(0.0, (self.push_n - self.tips_n) * self.height_mm / weight_n)
+
+    @property
+    def stands(self) -> bool:
+        """Whether it withstands the push."""
+        return self.tips_n >= self.push_n
+
+    @property
+    def words(self) -> str:
+        """What it takes to tip it."""
+        how = f"a push of {self.tips_n:.0f} N" if self.tips_n > 0.0 else "its own weight"
+        return (
+            f"what stands on {' and '.join(self.on)} is tipped {self.toward} by {how} at the "
+            f"height of the head, {self.push_n:.0f} N are asked"
+        )
+
+
+@dataclass(frozen=True, eq=False)
 class MountPlan:
     """A plan that can be built. ``system`` is the kind of mount; ``datum_rig_mm`` (3,).
 
     ``clashes`` is empty for a plan that can be built. ``steps`` are the assembly steps in order.
     ``yield_share``: share of Monte Carlo rigs, every setting off by a uniform error of half a
     step, that kept all limits; of ``yield_trials``. ``sags``: how each camera gives way under its
-    own weight; empty where the mount is not of members.
+    own weight, ``stances``: how what stands by itself resists tipping; empty where the mount is not
+    of members.
     """
 
     name: str
@@ -167,11 +214,18 @@ class MountPlan:
     steps: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     sags: tuple[Sag, ...] = ()
+    stances: tuple[Stance, ...] = ()
 
     @property
     def buildable(self) -> bool:
-        """Whether nothing clashes and no camera leans too far."""
-        return not self.clashes and not self.leaning
+        """Whether nothing clashes, no camera leans too far and nothing tips over."""
+        return not self.clashes and not self.leaning and not self.tipping
+
+    @property
+    def tipping(self) -> tuple[Stance, ...]:
+        """What does not withstand the push that it should, the weakest first."""
+        weak = [stance for stance in self.stances if not stance.stands]
+        return tuple(sorted(weak, key=lambda stance: stance.tips_n))
 
     @property
     def leaning(self) -> tuple[Sag, ...]:

@@ -23,6 +23,7 @@ from rig.build.mounts.planmodel import (
     PriceModel,
     SagModel,
     SettingModel,
+    StanceModel,
     TapeModel,
     ToleranceModel,
     WantedModel,
@@ -52,6 +53,7 @@ def plan_document(plan: MountPlan) -> dict[str, Any]:
         steps=list(plan.steps),
         notes=list(plan.notes),
         sags=[SagModel.of(sag) for sag in plan.sags],
+        stances=[StanceModel.of(stance) for stance in plan.stances],
     )
     return file.model_dump(by_alias=True)
 
@@ -109,6 +111,7 @@ def plan_from_mapping(data: object, name: str = "plan") -> MountPlan:
         steps=tuple(file.steps),
         notes=tuple(file.notes),
         sags=tuple(sag.made() for sag in file.sags),
+        stances=tuple(stance.made() for stance in file.stances),
     )
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from common.files.strict import Matrix, StrictModel, Vector
-from rig.build.mounts.plan import Clash, Figures, Give, Price, Sag, Tolerance
+from rig.build.mounts.plan import Clash, Figures, Give, Price, Sag, Stance, Tolerance
 from rig.build.mounts.settings import Link, Motion, Setting, Tape
 from rig.build.mounts.structuremodel import StructureModel, Transform, table
 from rig.design.designmodel import PlacedCamera
@@ -230,6 +230,34 @@ class SagModel(StrictModel):
         )  # fmt: skip
 
 
+class StanceModel(StrictModel):
+    """How something that stands by itself resists tipping."""
+
+    on: list[str]
+    mass_kg: float
+    centre_mm: Vector
+    height_mm: float
+    push_n: float
+    tips_n: float
+    toward: str
+    way: list[float] = Field(min_length=2, max_length=2)
+
+    @classmethod
+    def of(cls, stance: Stance) -> Self:
+        """The section that describes ``stance``."""
+        facts = {
+            "on": list(stance.on),
+            "centre_mm": [float(v) for v in stance.centre_mm],
+            "way": [float(v) for v in stance.way],
+        }
+        return cls.model_validate(vars(stance) | facts)
+
+    def made(self) -> Stance:
+        """What it describes."""
+        facts = {"on": tuple(self.on), "centre_mm": np.array(self.centre_mm)}
+        return Stance(**(vars(self) | facts | {"way": np.array(self.way)}))
+
+
 class PlanFile(StrictModel):
     """The root of a plan file."""
 
@@ -251,4 +279,7 @@ class PlanFile(StrictModel):
     notes: list[str] = Field(description="What else to know.")
     sags: list[SagModel] = Field(
         default_factory=list, description="How each camera gives way under the rig's own weight."
+    )
+    stances: list[StanceModel] = Field(
+        default_factory=list, description="How what stands by itself resists tipping."
     )

@@ -106,11 +106,15 @@ def _verdict(plan: MountPlan) -> str:
         words = plan.leaning[0].words
         word = f"{words[0].upper()}{words[1:]}."
         more = "Under Stiffness stands how far each camera gives way, and what would hold it."
+    elif plan.tipping:
+        words = plan.tipping[0].words
+        word = f"{words[0].upper()}{words[1:]}."
+        more = "What would keep it on its feet stands under Stiffness and in the notes."
     else:
         word = "It can be built: nothing collides and all limits of the design hold."
         loss = percent(max(0.0, plan.price.sigma_loss))
         more = f"Settings that exist cost {loss} of the median σ."
-    broken = bool(plan.clashes) or not plan.price.built.feasible or bool(plan.leaning)
+    broken = not plan.buildable or not plan.price.built.feasible
     css = "verdict broken" if broken else "verdict"
     return (
         f'<div class="{css}"><p class="word">{esc(word)}</p><p class="more">{esc(more)}</p></div>'

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from common.page.html import esc, section, table
-from rig.build.mounts.plan import MountPlan, Sag
+from common.page.html import element, esc, section, table
+from rig.build.mounts.plan import MountPlan, Sag, Stance
 
 WORDS = (
     "How far each camera sinks and leans under the weight of the whole rig, with profiles as beams "
@@ -11,6 +11,11 @@ WORDS = (
     "the sag are aimed out: the setting sheets say what to set more, and the tapes are taken with "
     "everything hung. What is left is compared with what the design allows."
 )
+TIPPING = (
+    "What stands by itself is to withstand a level push at the height of the head, a fifth of its "
+    "weight and 20 N at least. Below zero it would fall over by itself."
+)
+TIPPING_HEAD = ("Feet", "Mass kg", "Tipped by N", "Towards", "Asked N")
 HEAD = (
     "Camera", "Sinks mm", "Moves mm", "Leans °", "Touched: mm", "°", "Left, at worst", "Allowed",
 )  # fmt: skip
@@ -20,7 +25,22 @@ def stiffness(plan: MountPlan) -> str:
     """The section; empty for a plan of which nothing is known."""
     if not plan.sags:
         return ""
-    return section("stiffness", "Stiffness", WORDS, table(HEAD, [_row(sag) for sag in plan.sags]))
+    tables = table(HEAD, [_row(sag) for sag in plan.sags])
+    if plan.stances:
+        tables += element("p", esc(TIPPING))
+        tables += table(TIPPING_HEAD, [_stance(stance) for stance in plan.stances])
+    return section("stiffness", "Stiffness", WORDS, tables)
+
+
+def _stance(stance: Stance) -> tuple[str, ...]:
+    tips = f"{stance.tips_n:.0f}"
+    return (
+        esc(", ".join(stance.on)),
+        f"{stance.mass_kg:.1f}",
+        tips if stance.stands else f"<b>{tips}</b>",
+        esc(stance.toward),
+        f"{stance.push_n:.0f}",
+    )
 
 
 def _row(sag: Sag) -> tuple[str, ...]:

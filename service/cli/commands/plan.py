@@ -133,6 +133,7 @@ def why_not(result: PlanResult) -> str:
 def caution(result: PlanResult) -> str:
     """What is to be known of a rig that can be built; empty when it keeps every limit as set."""
     over = [sag.too_far for sag in result.sags if sag.too_far]
+    over += [stance.too_little for stance in result.stances if stance.too_little]
     if result.price.built.feasible:
         return f"{over[0]}; plan.html says what would hold it" if over else ""
     return (

@@ -34,6 +34,7 @@ def print_plan(result: PlanResult) -> None:
             markup=False,
         )
     _print_sags(console, result)
+    _print_stances(console, result)
     for note in result.notes:
         console.print(f"note: {note}", markup=False)
 
@@ -45,6 +46,17 @@ def _print_sags(console: Console, result: PlanResult) -> None:
     console.print(
         f"under its own weight {most.camera} leans most, by {_figure(most.leans_deg, 2)} degrees; "
         f"a touch of 5 N turns it by {_figure(most.touched_deg, 2)}",
+        markup=False,
+    )
+
+
+def _print_stances(console: Console, result: PlanResult) -> None:
+    if not result.stances:
+        return
+    weakest = min(result.stances, key=lambda stance: stance.tips_n or 0.0)
+    console.print(
+        f"a push of {_figure(weakest.tips_n, 0)} N at the height of the head tips it, "
+        f"{_figure(weakest.push_n, 0)} N are asked",
         markup=False,
     )
 

@@ -22,7 +22,7 @@ from rig.build.mounts.settings import CameraMount, Tape
 from rig.build.mounts.solids import bar, camera_solids, lens_front
 from rig.build.mounts.structure import Joint, Member, PlacedPart, Solid, Structure
 from rig.build.mounts.surroundings import Surroundings
-from rig.build.mounts.systems.base import Built
+from rig.build.mounts.systems.base import USUAL, Built, Spread
 from rig.build.mounts.systems.corners import leg_mm, unplaced, with_corners
 from rig.build.mounts.systems.hanging import Rail, hang_all
 from rig.build.mounts.systems.heads import HeadKind
@@ -101,6 +101,7 @@ class ArcSystem:
     share_mm: float
     radius_mm: float | None = None
     stays: bool = False
+    spread: Spread = USUAL
     kind: str = "arc"
 
     @property
@@ -187,6 +188,10 @@ class ArcHolding:
         """See :class:`rig.build.mounts.systems.base.Holding`."""
         return replace(self, system=replace(self.system, stays=True))
 
+    def with_spread(self, spread: Spread) -> Self:
+        """See :class:`rig.build.mounts.systems.base.Holding`."""
+        return replace(self, system=replace(self.system, spread=spread))
+
     def build(self) -> Built:
         """See :class:`rig.build.mounts.systems.base.Holding`."""
         facets = [facet for rib in self.ribs for facet in rib.facets]
@@ -256,7 +261,11 @@ class ArcHolding:
         out = [member("upright", [0.0, back, floor], [0.0, back, top])]
         foot, aside = floor + profile.height_mm / 2.0, profile.width_mm
         out.append(
-            member("foot", [aside, back - FOOT_MM[0], foot], [aside, back + FOOT_MM[1], foot])
+            member(
+                "foot",
+                [aside, back - self._behind_mm, foot],
+                [aside, back + FOOT_MM[1] + self.system.spread.front_mm, foot],
+            )
         )
         front = back + profile.height_mm / 2.0
         for role, facet in (("lower strut", rib.facets[0]), ("upper strut", rib.facets[-1])):
@@ -266,6 +275,10 @@ class ArcHolding:
                 z = float(end[2])
                 out.append(member(role, [0.0, front, z], [0.0, front + float(length), z]))
         return out
+
+    @property
+    def _behind_mm(self) -> float:
+        return FOOT_MM[0] + self.system.spread.rear_mm
 
     @property
     def _arm_mm(self) -> float:
@@ -336,7 +349,9 @@ class ArcHolding:
         level = float(pin[2] - upright.axis_mm[0, 2])
         out += [
             Joint(f"{rib.id} a", upright.id, nearest.id, pin, level, nearest.lean_deg, pivot),
-            Joint(f"{rib.id} b", foot.id, upright.id, upright.axis_mm[0], FOOT_MM[0], None, two),
+            Joint(
+                f"{rib.id} b", foot.id, upright.id, upright.axis_mm[0], self._behind_mm, None, two
+            ),
         ]
         for strut, facet in self._struts(rib):
             ends, along = strut.axis_mm, float(strut.axis_mm[0, 2] - upright.axis_mm[0, 2])

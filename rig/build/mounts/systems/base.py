@@ -13,6 +13,18 @@ from rig.build.mounts.surroundings import Surroundings
 from rig.build.mounts.systems.heads import HeadKind
 
 
+@dataclass(frozen=True)
+class Spread:
+    """By how much feet reach farther than usual, forward and back, and a row of them aside, mm."""
+
+    front_mm: float = 0.0
+    rear_mm: float = 0.0
+    beside_mm: float = 0.0
+
+
+USUAL = Spread()
+
+
 @dataclass(frozen=True, eq=False)
 class Built:
     """A structure with the mounts it carries.
@@ -46,6 +58,10 @@ class Holding(Protocol):
 
     def with_stays(self) -> Self:
         """The same arrangement with back-stays, where the mount has uprights that can lean."""
+        ...
+
+    def with_spread(self, spread: Spread) -> Self:
+        """The same arrangement on a wider base, where the mount can have one."""
         ...
 
     def build(self) -> Built:

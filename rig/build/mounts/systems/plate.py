@@ -25,7 +25,7 @@ from rig.build.mounts.settings import CameraMount, Tape
 from rig.build.mounts.solids import bar, box, camera_solids, carried, lens_front
 from rig.build.mounts.structure import Hole, Joint, Member, Plate, Structure
 from rig.build.mounts.surroundings import Surroundings
-from rig.build.mounts.systems.base import Built
+from rig.build.mounts.systems.base import USUAL, Built, Spread
 from rig.build.mounts.systems.corners import unplaced, with_corners
 from rig.build.mounts.systems.fits import CAMERA_SCREW, SCREW_HOLES_MM, Fitter, WedgeFit
 from rig.build.mounts.systems.posts import LONGEST_POST_MM, Posted, X, Y, Z, post_for
@@ -43,6 +43,7 @@ SPARE_MM = 20.0
 """Plate to the end of the hindmost base, for other turns of its post."""
 
 ROOM_MM = 1.0
+FOOT_MM = 350.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +62,7 @@ class PlateSystem:
     material: str
     catalogue: Catalogue
     stays: bool = False
+    spread: Spread = USUAL
     kind: str = "plate"
     head: None = None
 
@@ -152,6 +154,10 @@ class PlateHolding:
         """See :class:`rig.build.mounts.systems.base.Holding`."""
         return replace(self, system=replace(self.system, stays=True))
 
+    def with_spread(self, spread: Spread) -> Self:
+        """See :class:`rig.build.mounts.systems.base.Holding`."""
+        return replace(self, system=replace(self.system, spread=spread))
+
     def build(self) -> Built:
         """See :class:`rig.build.mounts.systems.base.Holding`."""
         low, high = self._extent()
@@ -225,13 +231,13 @@ class PlateHolding:
         out = []
         for name, x in (("left", high[0]), ("right", low[0])):
             at = x + (-profile.width_mm / 2.0 if x > 0.0 else profile.width_mm / 2.0)
+            beside = at + (profile.width_mm if x > 0.0 else -profile.width_mm)
+            level = floor + profile.height_mm / 2.0
+            front = depth + FOOT_MM + self.system.spread.front_mm
             lines = {
                 "upright": ([at, floor, depth], [at, high[1], depth]),
-                "foot": ([at + (profile.width_mm if x > 0.0 else -profile.width_mm),
-                          floor + profile.height_mm / 2.0, depth - 350.0],
-                         [at + (profile.width_mm if x > 0.0 else -profile.width_mm),
-                          floor + profile.height_mm / 2.0, depth + 350.0]),
-            }  # fmt: skip
+                "foot": ([beside, level, depth - self._behind_mm], [beside, level, front]),
+            }
             for role, line in lines.items():
                 axis = carried(self.face, np.array(line))
                 out.append(Member(f"{name} {role}", profile.id, role, axis, X, size))
@@ -241,6 +247,10 @@ class PlateHolding:
         # Its broad side level: so its slots lie on those of the uprights, for the brackets.
         out.append(Member("cross bar", profile.id, "cross bar", axis, Z, size))
         return out
+
+    @property
+    def _behind_mm(self) -> float:
+        return FOOT_MM + self.system.spread.rear_mm
 
     def _stays(self, stand: list[Member]) -> Stays:
         """A sill and a stay for each upright, where the plate has them."""
@@ -256,7 +266,8 @@ class PlateHolding:
         left, left_foot, right, right_foot, cross = stand
         out = []
         for upright, foot, end in ((left, left_foot, 0), (right, right_foot, 1)):
-            out.append(Joint(f"{foot.id} a", foot.id, upright.id, upright.axis_mm[0], 350.0, None,
+            out.append(Joint(f"{foot.id} a", foot.id, upright.id, upright.axis_mm[0],
+                             self._behind_mm, None,
                              two))  # fmt: skip
             along = float(cross.axis_mm[end, 2] - upright.axis_mm[0, 2])
             out.append(Joint(f"{upright.id} a", upright.id, cross.id, cross.axis_mm[end], along,

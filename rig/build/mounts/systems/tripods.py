@@ -27,7 +27,7 @@ from rig.build.mounts.settings import (
 from rig.build.mounts.solids import bar, camera_solids, lens_front
 from rig.build.mounts.structure import Joint, PlacedPart, Solid, Structure
 from rig.build.mounts.surroundings import Surroundings
-from rig.build.mounts.systems.base import Built
+from rig.build.mounts.systems.base import Built, Spread
 from rig.build.mounts.systems.heads import HeadKind, Stance, head_id, stances
 from rig.build.mounts.systems.threads import counted, height_mm
 from rig.catalogue.items import Bracket, Fastener
@@ -260,6 +260,10 @@ class TripodHolding:
 
     def with_stays(self) -> Self:
         """A tripod needs none."""
+        return self
+
+    def with_spread(self, spread: Spread) -> Self:  # noqa: ARG002
+        """A tripod has legs of its own."""
         return self
 
     def build(self) -> Built:

@@ -21,7 +21,7 @@ from rig.build.mounts.settings import CameraMount, Link, Motion, Setting, Tape, 
 from rig.build.mounts.solids import bar, camera_solids, lens_front
 from rig.build.mounts.structure import Joint, Member, Solid, Structure
 from rig.build.mounts.surroundings import Surroundings
-from rig.build.mounts.systems.base import Built
+from rig.build.mounts.systems.base import USUAL, Built, Spread
 from rig.build.mounts.systems.corners import leg_mm, unplaced, with_corners
 from rig.build.mounts.systems.hanging import Rail, hang_all, spread_order
 from rig.build.mounts.systems.heads import HeadKind
@@ -37,10 +37,6 @@ FOOT_MM = (300.0, 350.0)
 SHORT_FOOT_MM = 60.0
 """How far a foot reaches forward where another bay stands beside: together they stand firm."""
 
-LOOSE_BAYS = (
-    "The bays stand by themselves with short feet towards the subject: screw the feet to the floor "
-    "or weigh them down behind."
-)
 NARROWEST_MM = 500.0
 END_MM = 6.0
 """Between the bracket beside the last upright of a bay and that of its foot."""
@@ -157,6 +153,7 @@ class TSlotSystem:
     step_mm: float
     share_mm: float
     stays: bool = False
+    spread: Spread = USUAL
     kind: str = "t-slot"
 
     @property
@@ -239,6 +236,10 @@ class TSlotHolding:
         """See :class:`rig.build.mounts.systems.base.Holding`."""
         return replace(self, system=replace(self.system, stays=True))
 
+    def with_spread(self, spread: Spread) -> Self:
+        """See :class:`rig.build.mounts.systems.base.Holding`."""
+        return replace(self, system=replace(self.system, spread=spread))
+
     def build(self) -> Built:
         """See :class:`rig.build.mounts.systems.base.Holding`."""
         uprights = [_upright_member(u) for u in self.uprights]
@@ -261,9 +262,7 @@ class TSlotHolding:
             structure, pairs(*touching), self.system.outrigger.corner,
             tuple(m.camera for m in mounts), self.around,
         )  # fmt: skip
-        notes: tuple[str, ...] = (LOOSE_BAYS,) if len(self.bays) > 1 else ()
-        notes += unplaced(structure, self.system.outrigger.corner)
-        return Built(structure, mounts, joined, notes)
+        return Built(structure, mounts, joined, unplaced(structure, self.system.outrigger.corner))
 
     def _measured(self, hung: Hung) -> CameraMount:
         upright = next(u for u in self.uprights if u.id == hung.rail)
@@ -285,8 +284,12 @@ class TSlotHolding:
         parts = self.system.outrigger
         beyond = parts.profile.width_mm / 2.0 + 2.0 * leg_mm(parts.corner)[0] + END_MM
         low, high = min(places) - beyond, max(places) + beyond
-        more = max(0.0, NARROWEST_MM - (high - low)) / 2.0
+        more = max(0.0, NARROWEST_MM - (high - low)) / 2.0 + self.system.spread.beside_mm
         return float(np.floor(low - more)), float(np.ceil(high + more))
+
+    @property
+    def _behind_mm(self) -> float:
+        return FOOT_MM[0] + self.system.spread.rear_mm
 
     def _base(self, bay: Bay) -> list[Member]:
         """Bottom and top rail behind the uprights, and a foot at each end of the bottom rail."""
@@ -296,6 +299,7 @@ class TSlotHolding:
         back = bay.plane_mm - height / 2.0 - width / 2.0
         floor = self.around.floor_z_mm - self.around.datum_mm[2]
         forward = FOOT_MM[1] if len(self.bays) == 1 else SHORT_FOOT_MM
+        forward += self.system.spread.front_mm
 
         def member(role: str, start: list[float], end: list[float], across: Floats) -> Member:
             axis = self.around.datum_mm + np.array([start, end]) @ axes.T
@@ -310,7 +314,7 @@ class TSlotHolding:
             )
         ]
         feet = [
-            member(role, [x, back - FOOT_MM[0], z], [x, back + forward, z], X)
+            member(role, [x, back - self._behind_mm, z], [x, back + forward, z], X)
             for role, x, z in (
                 ("left foot", low - width / 2.0, floor + height / 2.0),
                 ("right foot", high + width / 2.0, floor + height / 2.0),
@@ -343,7 +347,7 @@ class TSlotHolding:
                 )
         for foot, end in ((left, 0), (right, 1)):
             point = bottom.axis_mm[end]
-            out.append(Joint(foot.id, foot.id, bottom.id, point, FOOT_MM[0], None, two))
+            out.append(Joint(foot.id, foot.id, bottom.id, point, self._behind_mm, None, two))
         return out
 
 

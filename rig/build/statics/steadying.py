@@ -1,0 +1,116 @@
+"""Building a mount so that it stands: feet that reach farther, until it withstands the push."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from common.errors import InputError
+from geometry.arrays import Floats
+from geometry.camera import RigCamera
+from rig.build.mounts.clashes import find_clashes
+from rig.build.mounts.plan import Stance
+from rig.build.mounts.settings import CameraMount
+from rig.build.mounts.structure import Structure
+from rig.build.mounts.surroundings import Surroundings
+from rig.build.mounts.systems.base import Built, Spread
+from rig.build.statics.stiffening import Stiffened
+from rig.build.statics.tipping import stances
+from rig.build.statics.weights import Masses
+
+ROOM = 1.15
+"""By how much more than the push a mount is made to withstand before its settings are final."""
+
+STEP_MM, FARTHEST_MM, TRIES = 25.0, 800.0, 8
+FACING = 0.5
+"""Cosine from which an edge is before or behind the feet, not beside them."""
+
+
+def steadied(
+    stiff: Stiffened, cameras: tuple[RigCamera, ...], around: Surroundings, masses: Masses
+) -> Stiffened:
+    """The same mount on feet that reach so far that nothing of it tips over.
+
+    As it was where it stands already, where no feet suffice, or where these would be in the way.
+    """
+    first, spread = stiff.first, Spread()
+    plain = first.build()
+    weak = worst = _weak(plain, around, masses)
+    built = plain
+    for _ in range(TRIES):
+        if not weak:
+            break
+        wider = _wider(spread, weak, built.structure)
+        if max(wider.front_mm, wider.rear_mm, wider.beside_mm) > FARTHEST_MM:
+            return stiff
+        spread = wider
+        built = first.with_spread(spread).build()
+        weak = _weak(built, around, masses)
+    if (
+        worst is weak
+        or weak
+        or _in_the_way(built, cameras, around) > _in_the_way(plain, cameras, around)
+    ):
+        return stiff
+    held = first.with_spread(spread)
+    without = replace(worst[0], push_n=worst[0].push_n / ROOM)
+    words = f"Feet reach {_reach(spread)} farther: without that {without.words}."
+    return replace(stiff, system=held.system, first=held, notes=(*stiff.notes, words))
+
+
+def settled_stances(
+    structure: Structure, mounts: tuple[CameraMount, ...], datum_mm: Floats, masses: Masses
+) -> tuple[tuple[Stance, ...], tuple[str, ...]]:
+    """The stances of a finished plan, and what is to be known of them."""
+    try:
+        found = stances(structure, mounts, datum_mm, masses)
+    except InputError as error:
+        return (), (f"Whether it tips over is not known: {error.problem}; {error.remedy}.",)
+    return found, tuple(f"It tips: {remedy(stance)}." for stance in found if not stance.stands)
+
+
+def remedy(stance: Stance) -> str:
+    """What keeps something on its feet that would tip over."""
+    return (
+        f"{stance.words}; screw {' and '.join(stance.on)} to the floor, or have them reach "
+        f"{STEP_MM * np.ceil(stance.lacks_mm / STEP_MM):.0f} mm farther {stance.toward}"
+    )
+
+
+def _weak(built: Built, around: Surroundings, masses: Masses) -> list[Stance]:
+    """What would tip over, the weakest first."""
+    try:
+        found = stances(built.structure, built.mounts, around.datum_mm, masses)
+    except InputError:
+        return []
+    weak = [replace(s, push_n=ROOM * s.push_n) for s in found if s.tips_n < ROOM * s.push_n]
+    return sorted(weak, key=lambda stance: stance.tips_n)
+
+
+def _wider(spread: Spread, weak: list[Stance], structure: Structure) -> Spread:
+    """Feet that reach as far as what tips lacks, each the way that it tips."""
+    members = {member.id: member for member in structure.members}
+    more = {"front_mm": 0.0, "rear_mm": 0.0, "beside_mm": 0.0}
+    for stance in weak:
+        axes = [np.diff(members[foot].axis_mm, axis=0)[0, :2] for foot in stance.on]
+        ways = [float(axis @ stance.way / np.linalg.norm(axis)) for axis in axes]
+        side = "beside_mm"
+        if max(ways) > FACING or min(ways) < -FACING:
+            side = "front_mm" if max(ways) > -min(ways) else "rear_mm"
+        lacks = max(STEP_MM, STEP_MM * float(np.ceil(stance.lacks_mm / STEP_MM)))
+        more[side] = max(more[side], lacks)
+    return Spread(
+        spread.front_mm + more["front_mm"],
+        spread.rear_mm + more["rear_mm"],
+        spread.beside_mm + more["beside_mm"],
+    )
+
+
+def _in_the_way(built: Built, cameras: tuple[RigCamera, ...], around: Surroundings) -> int:
+    return len(find_clashes(built.structure.solids, built.joined, cameras, around))
+
+
+def _reach(spread: Spread) -> str:
+    parts = {"forward": spread.front_mm, "back": spread.rear_mm, "to each side": spread.beside_mm}
+    return " and ".join(f"{size:.0f} mm {way}" for way, size in parts.items() if size > 0.0)
