@@ -90,8 +90,8 @@ def main() -> None:
             f"Head: {name}. Limits: `rig/specification/data/face.toml`, {chosen.starts} starts, "
             f"strategy {chosen.strategy}. "
             f"{len(prepared.subject.check_points)} check points.\n"
-            "Written by `python -m benchmarks.faces --scan HEAD "
-            "--out docs/explanation/face-designs.md`.\n"
+            f"Written by `python -m benchmarks.faces --scan HEAD --strategy {chosen.strategy} "
+            f"--starts {chosen.starts} --out docs/explanation/face-designs.md`.\n"
             "Sigma is the longest semi-axis of a point's error ellipsoid at half a pixel of "
             "image noise.\n\n"
         )  # fmt: skip
