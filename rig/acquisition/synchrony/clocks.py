@@ -32,13 +32,15 @@ ClockFitter = Callable[[Sequence[ClockSample]], DeviceClock | None]
 
 
 def fit_clock(samples: Sequence[ClockSample]) -> DeviceClock | None:
-    """The clock through the readings, by the same model as the trigger box's."""
-    from rig.acquisition.trigger.clock import ClockModel
+    """The clock through all readings of a capture, by the same model as the trigger box's.
 
-    model = ClockModel()
-    for sample in sorted(samples, key=lambda sample: sample.host_before_ns):
-        model.add(sample)
-    return model.fit()
+    However long the capture took: a camera is read before it is armed and again with its
+    pictures. Without the first of these its line would be drawn backwards from readings that
+    lie within milliseconds.
+    """
+    from rig.acquisition.trigger.clock import line_through
+
+    return line_through(sorted(samples, key=lambda sample: sample.host_before_ns))
 
 
 class TriggerTimeSource(StrEnum):

@@ -130,12 +130,20 @@ def _reset(received: CameraFrames, exposures: Sequence[Exposure]) -> Fault | Non
     if received.clock_jumped:
         what = "its clock was set or began anew during the capture"
     for e in exposures:
-        if e.at_host_ns is not None and e.at_host_ns > e.frame.arrived_host_ns + ARRIVAL_SLACK_NS:
+        if _before_its_exposure(e):
             what = "a picture is stamped later than it arrived"
     if not what:
         return None
     text = f"{received.camera}: {what}; its time stamps are not used"
     return Fault(FaultKind.TIMESTAMP_RESET, text, received.camera)
+
+
+def _before_its_exposure(exposure: Exposure) -> bool:
+    """Whether a picture arrived before it can have been exposed, whatever is not known."""
+    if exposure.at_host_ns is None:
+        return False
+    earliest_ns = exposure.at_host_ns - exposure.uncertainty_us * NS_PER_US
+    return earliest_ns > exposure.frame.arrived_host_ns + ARRIVAL_SLACK_NS
 
 
 def _by_timestamp(

@@ -14,6 +14,7 @@ Works for any clock that can be asked: a trigger box's or a camera's.
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -138,13 +139,26 @@ class ClockModel:
         Readings that contradict later ones are dropped, oldest first: the device's clock has
         jumped, or changed its rate.
         """
-        while len(self._samples) >= 2:
-            fit = _fit(list(self._samples), self._wire_ns)
-            if fit is not None:
-                return fit
+        fit = line_through(self._samples, self._wire_ns)
+        kept = fit.samples if fit is not None else min(1, len(self._samples))
+        while len(self._samples) > kept:
             self._samples.popleft()
             self.dropped += 1
-        return None
+        return fit
+
+
+def line_through(samples: Iterable[ClockSample], wire_ns: float = 0.0) -> ClockFit | None:
+    """The line through readings in the order of their time; None below two.
+
+    Readings that contradict later ones are left out, oldest first.
+    """
+    rest = list(samples)
+    while len(rest) >= 2:
+        fit = _fit(rest, wire_ns)
+        if fit is not None:
+            return fit
+        rest.pop(0)
+    return None
 
 
 def _fit(samples: list[ClockSample], wire_ns: float) -> ClockFit | None:

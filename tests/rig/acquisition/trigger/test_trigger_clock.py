@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rig.acquisition.cameras.base import ClockSample
+from rig.acquisition.synchrony.clocks import fit_clock
 from rig.acquisition.trigger.clock import MAX_SAMPLES, WINDOW_S, ClockFit, ClockModel
 
 HOST0 = 5_000_000_000_000
@@ -134,6 +135,19 @@ def test_the_window_is_bounded() -> None:
     for number in range(1000):
         model.add(reading(number * 1.0, 0.0, 0.001, 0.001))
     assert len(model) <= min(MAX_SAMPLES, WINDOW_S + 1)
+
+
+@pytest.mark.parametrize("minutes", [1.0, 2.5, 30.0])
+def test_a_camera_is_timed_however_long_its_capture_took(minutes: float) -> None:
+    end_s = 60.0 * minutes
+    early = [reading(0.001 * number, 18.0, 2e-5, 2e-5) for number in range(8)]
+    late = [reading(end_s + 0.001 * number, 18.0, 2e-5, 2e-5) for number in range(8)]
+    clock = fit_clock(late + early)
+    assert clock is not None
+    # A fire shortly after arming: between two bounds that are 40 us apart.
+    at = device_ns(HOST0 + 0.5e9, 18.0)
+    assert clock.uncertainty_us(at) <= 22.0
+    assert abs(clock.host_ns(at) - (HOST0 + 0.5e9)) / 1e3 <= 22.0
 
 
 def test_one_reading_is_no_line() -> None:
