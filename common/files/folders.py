@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import shutil
+import stat
 import tempfile
 from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from common.errors import ConflictError, InputError
-from common.files.lock import LockHeldError, lock_folder
+from common.files.lock import KernelLock, LockHeldError, lock_folder
 from common.files.ownership import MARKER, files_of, foreign, mark
+from common.files.placing import NOT_REPLACED, put_in_place
 
+_FULL = (errno.ENOSPC, errno.EDQUOT)
+_OF_THE_DISK = (*_FULL, errno.EIO, errno.EROFS, errno.EFBIG)
 _ANOTHER = "give another --out, or move it away yourself"
 
 
@@ -27,97 +33,102 @@ def new_folder(
     that is not empty, for links, and where ``out`` holds one of the files and folders to
     ``spare``, which would be lost; :class:`InputError` where nothing can be written.
     """
-    _refuse_place(out)
-    _refuse_loss(out, spare)
-    _refuse_here(out)
-    if _holds_something(out):
-        if not force:
-            raise ConflictError(
-                "out-not-empty",
-                f"the folder {out} is not empty",
-                "give another --out, or --force to replace results that are in it",
-            )
-        _refuse_foreign(out, out, renewed)
-    made = _missing_parents(out)
-    partial = _beside(out)
-    try:
-        (partial / "files").mkdir()
-        yield partial / "files"
-        mark(partial / "files")
-        _put_in_place(partial, out, renewed)
-    finally:
-        shutil.rmtree(partial, ignore_errors=True)
-        if not out.exists():
-            _remove_empty(made)
+    with _told(out):
+        _refuse_place(out)
+        _refuse_loss(out, spare)
+        _refuse_here(out)
+        held = _holds_something(out)
+        if held and not force:
+            raise ConflictError("out-not-empty", f"the folder {out} is not empty", NOT_REPLACED)
+        if held:
+            _refuse_foreign(out, out, renewed)
+
+    def may_go(old: Path) -> None:
+        _refuse_foreign(old, out, renewed)
+
+    with _half_made(out) as half:
+        with _told(out, only=_OF_THE_DISK):
+            yield half
+        with _told(out):
+            mark(half)
+            put_in_place(half, out, may_go if force else None)
 
 
 @contextmanager
-def whole_folder(out: Path) -> Iterator[Path]:
+def whole_folder(out: Path, may_go: Callable[[Path], None]) -> Iterator[Path]:
     """An empty folder that becomes ``out`` when all went well, and disappears when not.
 
-    What was in ``out`` is replaced then: whoever calls made sure (:func:`refuse_others`) that it
-    may be. Raises :class:`InputError` where it cannot be written.
+    What was in ``out`` is replaced then, where ``may_go`` raises nothing when it looks through it
+    (:func:`refuse_others`). Raises :class:`ConflictError` where something that must stay is
+    there, :class:`InputError` where it cannot be written.
     """
-    partial = _beside(out)
-    try:
-        (partial / "files").mkdir()
-        yield partial / "files"
-        if _holds_something(out):
-            out.rename(partial / "old")
-        _rename_new(partial, out)
-    except OSError as error:
-        raise InputError(
-            "out-unwritable",
-            f"cannot write to {out} ({(error.strerror or 'unwritable').lower()})",
-            "choose another --out folder",
-        ) from error
-    finally:
-        shutil.rmtree(partial, ignore_errors=True)
+
+    def asked(old: Path) -> None:
+        try:
+            may_go(old)
+        except ConflictError as error:
+            problem = error.problem.replace(str(old), str(out))
+            raise ConflictError(error.detail, problem, error.remedy) from error
+
+    with _told(out):
+        _refuse_place(out)
+    with _half_made(out) as half, _told(out):
+        yield half
+        put_in_place(half, out, asked)
 
 
 @contextmanager
 def grown_folder(
-    out: Path, kept: str, *, force: bool, spare: Iterable[Path] = (), same: Callable[[], bool]
+    out: Path,
+    kept: str,
+    *,
+    force: bool,
+    ours: Callable[[Path], bool],
+    same: Callable[[], bool],
+    spare: Callable[[], Iterable[Path]] = tuple,
 ) -> Iterator[Path]:
     """An empty folder whose files join ``out`` when all went well, and disappear when not.
 
     What is in ``out/kept`` stays, whatever happens, and may grow meanwhile; the rest of ``out`` is
-    replaced. Its results are replaced without ``force`` where ``same`` says that they are of the
-    same work, or where there are none yet. Raises as :func:`new_folder` does, and where another
-    process is at work in ``out``.
+    replaced. Only files there that are ``ours`` are listed as this program's. Results are replaced
+    without ``force`` where ``same`` says that they are of the same work, or where there are none
+    yet. Raises as :func:`new_folder` does, and where another process is at work in ``out``.
     """
-    _refuse_place(out)
-    _refuse_loss(out, spare)
-    held, made = _holds_something(out), _missing_parents(out)
-    if held:
-        _refuse_other_work(out, kept, force=force, same=same)
+    with _told(out):
+        _refuse_place(out)
+        existed, held, made = out.exists(), _holds_something(out), _missing_parents(out)
+        if held:
+            _refuse_other_work(out, kept, force=force, same=same)
+        _refuse_loss(out, spare())
+        lock = _begun(out)
+    try:
+        with _half_made(out) as half:
+            with _told(out, only=_OF_THE_DISK):
+                yield half
+            with _told(out):
+                # Looked at again: it was in plain view for long.
+                _refuse_foreign(out, out, _all_in(out / kept))
+                _clear(out, kept)
+                for path in sorted(half.iterdir()):
+                    path.replace(out / path.name)
+                mark(out, [path for path in _all_in(out / kept) if not ours(path)])
+    finally:
+        lock.release()
+        if not held and not files_of(out):
+            (out / MARKER).unlink(missing_ok=True)
+            _remove_empty([] if existed else [out, *made])
+
+
+def _begun(out: Path) -> KernelLock:
+    """A marked folder, and the lock of whoever works in it."""
     try:
         out.mkdir(parents=True, exist_ok=True)
         if not (out / MARKER).exists():
             mark(out)
-        lock = lock_folder(out)
+        return lock_folder(out)
     except LockHeldError as error:
         remedy = "wait until it has ended, or give another --out"
         raise ConflictError("out-busy", f"another process works in {out}", remedy) from error
-    except OSError as error:
-        problem = f"cannot write into {out} ({(error.strerror or 'unwritable').lower()})"
-        raise InputError("out-unwritable", problem, "give another --out") from error
-    partial = _beside(out)
-    try:
-        (partial / "files").mkdir()
-        yield partial / "files"
-        # Looked at again: it was in plain view for long.
-        _refuse_foreign(out, out, _all_in(out / kept))
-        _clear(out, kept)
-        for path in sorted((partial / "files").iterdir()):
-            path.replace(out / path.name)
-        mark(out)
-    finally:
-        lock.release()
-        shutil.rmtree(partial, ignore_errors=True)
-        if not held and not files_of(out):
-            shutil.rmtree(out, ignore_errors=True)
-            _remove_empty(made)
 
 
 def _refuse_other_work(out: Path, kept: str, *, force: bool, same: Callable[[], bool]) -> None:
@@ -127,7 +138,7 @@ def _refuse_other_work(out: Path, kept: str, *, force: bool, same: Callable[[], 
         raise ConflictError(
             "out-not-empty",
             f"the folder {out} is not empty",
-            "give another --out, or --force to replace results that are in it",
+            NOT_REPLACED,
         )
     _refuse_foreign(out, out, _all_in(out / kept))
 
@@ -171,12 +182,75 @@ def refuse_others(out: Path, own: Collection[str]) -> None:
         raise ConflictError("out-not-a-folder", f"{out} is not a folder", "choose another place")
 
 
+@contextmanager
+def _told(out: Path, only: Collection[int] = ()) -> Iterator[None]:
+    """What the system refuses, in one line; ``only`` where it can be of nothing but the disk."""
+    try:
+        yield
+    except OSError as error:
+        if only and error.errno not in only:
+            raise
+        raise InputError(
+            "out-unwritable",
+            f"cannot write to {out} ({(error.strerror or 'unwritable').lower()})",
+            "free space on the disk, or give another --out"
+            if error.errno in _FULL
+            else "give another --out",
+        ) from error
+
+
+@contextmanager
+def _half_made(out: Path) -> Iterator[Path]:
+    """A new folder in a hidden one beside ``out``; both are gone afterwards.
+
+    Of the hidden folder nothing but what stands in the new one is ever removed: what was in
+    ``out`` may be there, where it could not be put back.
+    """
+    with _told(out):
+        made = _missing_parents(out)
+        partial = _beside(out)
+    try:
+        (partial / "files").mkdir()
+        yield partial / "files"
+    finally:
+        shutil.rmtree(partial / "files", ignore_errors=True)
+        _remove_empty([partial, *([] if out.exists() else made)])
+
+
 def _refuse_place(out: Path) -> None:
-    """Refuse what is no folder of its own."""
+    """Refuse what is no folder of its own, or one that this user may not replace."""
     if out.is_symlink():
         raise ConflictError("out-not-a-folder", f"{out} is a link", "give another --out")
     if out.exists() and not out.is_dir():
-        raise InputError("out-not-a-folder", f"{out} is a file", "give another --out")
+        kind = "a file" if out.is_file() else "no folder"
+        raise InputError("out-not-a-folder", f"{out} is {kind}", "give another --out")
+    for parent in out.parents:
+        if parent.is_symlink() and not parent.exists():
+            raise InputError(
+                "out-not-a-folder",
+                f"cannot write into {parent} (a link to nothing)",
+                "give another --out",
+            )
+        if parent.exists() and not parent.is_dir():
+            raise InputError(
+                "out-not-a-folder",
+                f"cannot write into {parent} (not a folder)",
+                "give another --out",
+            )
+    if out.exists():
+        _refuse_protected(out)
+
+
+def _refuse_protected(out: Path) -> None:
+    """Refuse at once what the system would refuse when all the work is done."""
+    if os.path.ismount(out):
+        raise ConflictError(
+            "out-not-ours", f"{out} is a place where a disk is mounted", "give a folder in it"
+        )
+    beside = out.absolute().parent.stat()
+    owners = (0, beside.st_uid, out.stat().st_uid)
+    if beside.st_mode & stat.S_ISVTX and os.geteuid() not in owners:
+        raise ConflictError("out-not-ours", f"{out} is another user's", "give another --out")
 
 
 def _refuse_here(out: Path) -> None:
@@ -217,43 +291,6 @@ def _holds_something(out: Path) -> bool:
 
 def _beside(out: Path) -> Path:
     """A new folder in the folder that ``out`` is to stand in."""
-    try:
-        out.parent.mkdir(parents=True, exist_ok=True)
-        return Path(tempfile.mkdtemp(prefix=f".{out.name}-", dir=out.parent))
-    except OSError as error:
-        raise InputError(
-            "out-unwritable",
-            f"cannot write into {out.parent} ({error.strerror})",
-            "give another --out",
-        ) from error
-
-
-def _put_in_place(partial: Path, out: Path, renewed: Collection[Path]) -> None:
-    """Rename the new folder to ``out``; what was there steps aside first and is removed last."""
-    old = partial / "old"
-    try:
-        if _holds_something(out):
-            out.rename(old)
-            # Looked at again now that nobody else knows where it is: it was in plain view for long.
-            _refuse_foreign(old, out, renewed)
-        _rename_new(partial, out)
-    except OSError as error:
-        raise InputError(
-            "out-unwritable",
-            f"cannot write to {out} ({(error.strerror or 'unwritable').lower()})",
-            "give another --out",
-        ) from error
-    finally:
-        if old.exists() and not out.exists():
-            old.rename(out)
-
-
-def _rename_new(partial: Path, out: Path) -> None:
-    """A rename onto a folder that is empty replaces it; onto any other it fails."""
-    old = partial / "old"
-    try:
-        (partial / "files").rename(out)
-    except OSError:
-        if old.exists() and not out.exists():
-            old.rename(out)
-        raise
+    out.parent.mkdir(parents=True, exist_ok=True)
+    # Not named after it: a name that is nearly as long as names may be would not fit.
+    return Path(tempfile.mkdtemp(prefix=f".{out.name[:40]}-", dir=out.parent))

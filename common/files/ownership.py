@@ -26,9 +26,9 @@ def files_of(folder: Path) -> dict[str, Path]:
     return {name: path for name, path in found.items() if path.is_file() and name != MARKER}
 
 
-def mark(folder: Path) -> None:
-    """Write the list of all files that are in ``folder`` now."""
-    files = {name: _sha256(path) for name, path in files_of(folder).items()}
+def mark(folder: Path, but: Collection[Path] = ()) -> None:
+    """Write the list of all files that are in ``folder`` now, ``but`` those of somebody else."""
+    files = {name: _sha256(path) for name, path in files_of(folder).items() if path not in but}
     document = {"schema": SCHEMA, "sha256": files}
     text = json.dumps(document, indent=1, ensure_ascii=False) + "\n"
     (folder / MARKER).write_text(text, encoding="utf-8")
@@ -66,7 +66,7 @@ def _listed(folder: Path) -> dict[str, str] | None:
         if document["schema"] != SCHEMA:
             return None
         return {str(name): str(digest) for name, digest in document["sha256"].items()}
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         return None
 
 

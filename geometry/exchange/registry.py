@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from common.errors import ConflictError, NotFoundError
-from common.files.folders import whole_folder
+from common.errors import NotFoundError
+from common.files.folders import refuse_others, whole_folder
 from common.words import did_you_mean
 from geometry.exchange import (
     blender,
@@ -80,12 +80,13 @@ def write_export(
 
     The files are written beside it and renamed, so that ``out`` never holds half an export.
     """
+
+    def may_go(held: Path) -> None:
+        refuse_others(held, ())
+
+    may_go(out)
     files = export_files(name, cameras, options)
-    if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise ConflictError(
-            "out-not-empty", f"{out} is there already", "choose an empty or new folder"
-        )
-    with whole_folder(out) as half:
+    with whole_folder(out, may_go) as half:
         for file_name, content in files.items():
             (half / file_name).write_bytes(content)
     return {file_name: out / file_name for file_name in files}

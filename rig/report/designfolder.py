@@ -114,7 +114,7 @@ def write_design_folder(
     """
     check_design_folder(out)
     makers = design_files(design, layout, prepared, spec, scan_name)
-    with whole_folder(out) as half:
+    with whole_folder(out, check_design_folder) as half:
         for name, make in makers.items():
             (half / name).write_bytes(make())
     return {name: out / name for name in makers}

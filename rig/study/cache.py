@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from contextlib import suppress
 from pathlib import Path
 
@@ -9,6 +10,15 @@ from common.errors import RigwrightError
 from common.files.strict import parsed
 from common.files.writing import write_whole
 from rig.study.unit import UnitResult
+
+_UNIT = re.compile(r"[0-9a-f]{64}\.json")
+_HALF = re.compile(r"\.[0-9a-f]{64}\.json\.[0-9a-f]{8}")
+"""As :func:`common.files.writing.write_whole` names what it has not finished."""
+
+
+def is_unit(path: Path) -> bool:
+    """Whether a file bears the name of a unit, and not one that somebody gave to theirs."""
+    return _UNIT.fullmatch(path.name) is not None
 
 
 class UnitCache:
@@ -34,7 +44,8 @@ class UnitCache:
     def clean(self) -> None:
         """Remove what a killed process left half written."""
         for path in self._folder.glob(".*.json.*"):
-            path.unlink(missing_ok=True)
+            if _HALF.fullmatch(path.name):
+                path.unlink(missing_ok=True)
 
     def _path(self, key: str) -> Path:
         return self._folder / f"{key}.json"

@@ -105,14 +105,16 @@ def _require_file(path: Path) -> None:
 
 @contextmanager
 def cancel_on_signal() -> Iterator[threading.Event]:
-    """An event that Ctrl-C or TERM sets, instead of ending the program."""
+    """An event that Ctrl-C, TERM or a closed terminal sets, instead of ending the program."""
     cancel = threading.Event()
 
     def ask(_number: int, _frame: FrameType | None) -> None:
         cancel.set()
 
     before: dict[int, Callable[..., Any] | int | None] = {}
-    for number in (int(signal.SIGINT), int(signal.SIGTERM)):
+    for number in (int(signal.SIGINT), int(signal.SIGTERM), int(signal.SIGHUP)):
+        if number == signal.SIGHUP and signal.getsignal(number) is signal.SIG_IGN:
+            continue  # nohup
         before[number] = signal.signal(number, ask)
     try:
         yield cancel

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shutil
+
 from calibration.targets.boards import AprilGrid, Chessboard, DotGrid
 from calibration.targets.files import read_targets, write_targets
 from calibration.targets.kinds import CharucoPlate, MarkerCarrier, RingCarrier, TargetPlan
@@ -23,9 +25,11 @@ def targets(task: Task[TargetsRequest, TargetsResult], running: Running) -> Targ
     if "design" in task.inputs:
         proposal = proposal_for(task.inputs["design"])
         plan, cameras, notes = proposal.plan, seen_by_cameras(proposal), list(proposal.notes)
+        write_targets(plan, task.folder / "targets.toml")
     else:
         plan = read_targets(task.inputs["targets"])
-    write_targets(plan, task.folder / "targets.toml")
+        # As it was given: with what somebody noted in it.
+        shutil.copyfile(task.inputs["targets"], task.folder / "targets.toml")
     sheets = sheets_of(plan, task.request.page)
     for number, sheet in enumerate(sheets.values()):
         if running.cancel.is_set():

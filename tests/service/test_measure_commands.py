@@ -86,10 +86,12 @@ def test_targets_are_printed(tmp_path: Path) -> None:
     assert "is not empty; give another --out, or --force" in again.stderr
     # The ruler is measured, written into the set beside the sheets, and all is printed anew.
     ruled = (tmp_path / "targets" / "targets.toml").read_text()
-    ruler = "ruler = { drawn_mm = 100.0, measured_mm = 99.0 }\n"
+    ruler = "# by anna\nruler = { drawn_mm = 100.0, measured_mm = 99.0 }\n"
     (tmp_path / "targets" / "targets.toml").write_text(ruled + ruler)
     run(tmp_path, "targets", "targets/targets.toml", "--force")
-    kept = tomllib.loads((tmp_path / "targets" / "targets.toml").read_text())
+    text = (tmp_path / "targets" / "targets.toml").read_text()
+    assert "# by anna" in text
+    kept = tomllib.loads(text)
     assert kept["plates"][0]["ruler"]["measured_mm"] == 99.0
 
 

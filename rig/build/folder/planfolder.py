@@ -38,7 +38,7 @@ def write_plan(
     """
     check_plan_folder(out)
     files, stop = plan_files(plan, options), cancel or NeverCancelled()
-    with whole_folder(out) as half:
+    with whole_folder(out, check_plan_folder) as half:
         _write_all(half, list(files.values()), progress, stop)
     return {name: out / name for name in (*files, MANIFEST)}
 

@@ -46,6 +46,7 @@ def study(
     """
     from common.files.folders import grown_folder
     from common.files.ownership import files_of
+    from rig.study.cache import is_unit
     from rig.study.heads import heads_of, study_identity
     from rig.study.resultfile import identity_in
     from service.cli.output import print_result_json
@@ -70,7 +71,9 @@ def study(
 
         kept = str((out / UNITS).absolute())
         run = RunContext(workers=processes(workers), cache=kept, cluster=dask)
-        with grown_folder(out, UNITS, force=force, spare=[plan], same=same) as folder:
+        with grown_folder(
+            out, UNITS, force=force, ours=is_unit, same=same, spare=lambda: _named(plan)
+        ) as folder:
             request, inputs = asked()
             result = run_task(STUDY, request, inputs, folder, run)
         files = {
@@ -93,6 +96,16 @@ def _why(result: StudyResult) -> str:
     )
 
 
+def _named(plan: Path) -> list[Path]:
+    """The study file, and all that it names."""
+    from rig.study.studyfile import read_study_file
+    from service.cli.running import require_files
+
+    require_files([plan])
+    file = read_study_file(plan)
+    return [plan, *(plan.parent / name for name in (*file.rigs, *file.heads))]
+
+
 def _read(plan: Path) -> tuple[StudyRequest, dict[str, Path]]:
     """The request, and the scans by role."""
     from rig.specification.rigfile import read_rig_file
@@ -101,11 +114,10 @@ def _read(plan: Path) -> tuple[StudyRequest, dict[str, Path]]:
     from service.cli.running import require_files
     from service.kinds.study import StudyRequest
 
-    require_files([plan])
+    require_files(_named(plan))
     file = read_study_file(plan)
     rigs = [plan.parent / name for name in file.rigs]
     heads = [plan.parent / name for name in file.heads]
-    require_files([*rigs, *heads])
     request = StudyRequest(
         study=file.study(),
         rigs=[read_rig_file(path) for path in rigs],

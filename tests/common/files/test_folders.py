@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import shutil
 import socket
@@ -13,7 +14,8 @@ import pytest
 from typer.testing import CliRunner
 
 from common.errors import ConflictError, InputError
-from common.files.folders import grown_folder, new_folder
+from common.files import placing
+from common.files.folders import grown_folder, new_folder, whole_folder
 from common.files.ownership import MARKER, files_of, mark
 from service.cli import app
 
@@ -321,7 +323,11 @@ def test_the_list_names_every_file(tmp_path: Path) -> None:
 
 
 def grown(out: Path, *, force: bool = False, same: bool = True) -> AbstractContextManager[Path]:
-    return grown_folder(out, "units", force=force, same=lambda: same)
+    return grown_folder(out, "units", force=force, ours=is_one, same=lambda: same)
+
+
+def is_one(path: Path) -> bool:
+    return path.name in ("one.json", "two.json")
 
 
 def test_a_folder_grows_and_keeps_what_was_finished_before_it_failed(tmp_path: Path) -> None:
@@ -375,3 +381,124 @@ def test_what_somebody_lays_into_a_growing_folder_is_not_removed(tmp_path: Path)
         put(folder, study_json="{}")
         put(out, note_txt="mine")
     assert list(files_of(out)) == ["note.txt"]
+
+
+def test_a_study_s_units_are_ours_and_what_somebody_laid_beside_them_is_not(
+    tmp_path: Path,
+) -> None:
+    out = tmp_path / "out"
+    for _ in range(2):
+        with grown(out) as folder:
+            put(folder, study_json="{}")
+            put(out, units__one_json="1", units__notes_txt="mine", units__sub__x_txt="mine")
+    with pytest.raises(ConflictError, match=r"units/notes\.txt"), new_folder(out, force=True):
+        raise AssertionError
+    assert (out / "units" / "sub" / "x.txt").read_text() == "mine"
+
+
+def test_what_a_study_reads_is_not_in_the_way_of_what_it_writes(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    with grown(out) as folder:
+        put(folder, study_json="{}", head_xyz="0")
+    with (
+        pytest.raises(ConflictError, match=r"head\.xyz, which would be lost"),
+        grown_folder(
+            out, "units", force=True, ours=is_one, same=bool, spare=lambda: [out / "head.xyz"]
+        ),
+    ):
+        raise AssertionError
+
+
+def test_an_empty_folder_keeps_its_permissions_and_stays_when_work_fails(tmp_path: Path) -> None:
+    made = (new_folder(tmp_path / "one", force=False), grown(tmp_path / "two"))
+    for out, folder in zip((tmp_path / "one", tmp_path / "two"), made, strict=True):
+        out.mkdir()
+        out.chmod(0o2770)
+        with folder as half:
+            put(half, study_json="{}")
+        assert out.stat().st_mode & 0o7777 == 0o2770
+    out = tmp_path / "three"
+    out.mkdir()
+    with pytest.raises(ZeroDivisionError), grown(out):
+        raise ZeroDivisionError
+    assert list(out.iterdir()) == []
+
+
+def test_nothing_is_replaced_without_force_that_came_while_the_work_ran(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    with pytest.raises(ConflictError, match="--force"), new_folder(out, force=False) as folder:
+        put(folder, study_json="{}")
+        ours(out)
+    assert "design.json" in files_of(out)
+
+
+@pytest.mark.parametrize("at_once", [True, False])
+def test_what_stood_there_is_never_lost_when_it_cannot_be_put_back(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, at_once: bool
+) -> None:
+    if not at_once:
+        monkeypatch.setattr(placing, "_exchange", placing._exchange_by_steps)
+    exchange, calls = placing._exchange, []
+
+    def once(one: Path, other: Path) -> None:
+        calls.append(one)
+        if len(calls) > 1:
+            raise OSError(errno.EIO, "input/output error")
+        exchange(one, other)
+
+    monkeypatch.setattr(placing, "_exchange", once)
+    out = tmp_path / "out"
+    ours(out)
+    with pytest.raises((ConflictError, InputError)), new_folder(out, force=True) as folder:
+        put(folder, new_json="{}")
+        put(out, notes_txt="mine")
+    (kept,) = (p for p in tmp_path.rglob("notes.txt"))
+    assert kept.read_text() == "mine"
+
+
+@pytest.mark.parametrize("at_once", [True, False])
+def test_two_folders_change_places(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, at_once: bool
+) -> None:
+    if not at_once:
+        monkeypatch.setattr(placing, "_RENAME_EXCHANGE", 0x1000)  # not one that a kernel knows
+    put(tmp_path / "a", a_txt="1")
+    put(tmp_path / "b", b_txt="2")
+    placing._exchange(tmp_path / "a", tmp_path / "b")
+    assert [list(files_of(tmp_path / name)) for name in "ab"] == [["b.txt"], ["a.txt"]]
+
+
+def _too_long(place: Path) -> Path:
+    return place / ("x" * 300)
+
+
+def _below_a_file(place: Path) -> Path:
+    (place / "file").write_text("mine")
+    return place / "file" / "out"
+
+
+def _below_nothing(place: Path) -> Path:
+    (place / "link").symlink_to("nowhere")
+    return place / "link" / "out"
+
+
+@pytest.mark.parametrize("kind", [_too_long, _below_a_file, _below_nothing])
+def test_a_place_that_cannot_be_is_told_in_one_line(
+    tmp_path: Path, kind: Callable[[Path], Path]
+) -> None:
+    out = kind(tmp_path)
+    before = seen(tmp_path)
+    for folder in (new_folder(out, force=True), grown(out), whole_folder(out, print)):
+        with pytest.raises(InputError) as caught, folder:
+            raise AssertionError
+        assert "\n" not in str(caught.value)
+    assert seen(tmp_path) == before
+
+
+def test_a_full_disk_is_told_and_leaves_nothing(tmp_path: Path) -> None:
+    out = tmp_path / "a" / "b"
+    with pytest.raises(InputError, match="free space"), new_folder(out, force=True):
+        raise OSError(errno.ENOSPC, "No space left on device")
+    with pytest.raises(ConnectionError), new_folder(out, force=True):
+        raise ConnectionError(errno.ECONNRESET, "not of the disk")
+    assert list(tmp_path.iterdir()) == []
