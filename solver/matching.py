@@ -1,7 +1,7 @@
 """What a matcher can use: which two views of a point look alike enough to be found in each other.
 
 The figures that stand by default are those of dense matching on skin: beyond 40 degrees between two
-rays no patch model follows (``evaluation/reconstruction/pairs.py``), surfaces seen at more than 70
+rays no patch model follows (reconstructions keep to the same limit), surfaces seen at more than 70
 degrees tell little, and at half as many pixels again on the one side patches no longer fit.
 """
 

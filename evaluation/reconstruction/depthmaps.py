@@ -83,38 +83,13 @@ def refined(
 
     ``slopes`` (h, w, 2) change of the inverse depth per pixel along columns and rows.
     """
-    from evaluation.reconstruction.kernel import FIELDS, refine
-
     height, width = start.shape
-    rows, columns = np.mgrid[0:height, 0:width] * stride_px
-    reach = matching.half_width_samples
-    inside = (
-        np.isfinite(start)
-        & (columns >= reach)
-        & (rows >= reach)
-        & (columns < reference.grey.shape[1] - reach)
-        & (rows < reference.grey.shape[0] - reach)
-    )
-    inside &= ~reference.clipped[rows, columns]
-    pixels = np.stack([columns[inside], rows[inside]], axis=1).astype(np.int64)
-    firsts = np.column_stack([start[inside], slopes[inside]]).astype(np.float64)
-    matrices, shifts = relations(reference, others)
-    found = refine(
-        reference.grey,
-        np.stack([v.grey for v in others]),
-        matrices,
-        shifts,
-        pixels,
-        firsts,
-        matching.half_width_samples,
-        1,
-        matching.steps,
-        matching.least_correlation,
-    )
-    full = np.full((height, width, FIELDS), np.nan)
-    full[inside] = found
-    good = inside & (full[..., 3] > 0.0) & (full[..., 5] >= 1.0) & (full[..., 6] < 0.5)
-    full[~good] = np.nan
+    known = np.isfinite(start)
+    rows, columns = np.nonzero(known)
+    pixels = np.stack([columns, rows], axis=1).astype(np.int64) * stride_px
+    found = matched(reference, others, pixels, start[known], slopes[known], matching)
+    full = np.full((height, width, found.shape[1]), np.nan)
+    full[known] = found
     return DepthMap(
         reference,
         stride_px,
@@ -124,6 +99,43 @@ def refined(
         full[..., 4].astype(np.float32),
         np.nan_to_num(full[..., 5], nan=0.0).astype(np.int8),
     )
+
+
+def matched(
+    reference: View,
+    others: Sequence[View],
+    pixels: NDArray[np.int64],
+    rho: Floats,
+    slopes: Floats,
+    matching: Matching,
+) -> Floats:
+    """Patches about ``pixels`` (N, 2), column and row, from the planes ``rho``, ``slopes`` (N, 2).
+
+    Returns the kernel's fields (N, FIELDS), NaN where nothing matched.
+    """
+    from evaluation.reconstruction.kernel import FIELDS, refine
+
+    reach = matching.half_width_samples
+    width, height = reference.size_px
+    inside = (pixels >= reach).all(axis=1) & (pixels < [width - reach, height - reach]).all(axis=1)
+    inside[inside] = ~reference.clipped[pixels[inside, 1], pixels[inside, 0]]
+    matrices, shifts = relations(reference, others)
+    fields = np.full((len(pixels), FIELDS), np.nan)
+    fields[inside] = refine(
+        reference.grey,
+        np.stack([v.grey for v in others]),
+        matrices,
+        shifts,
+        pixels[inside],
+        np.column_stack([rho, slopes])[inside].astype(np.float64),
+        reach,
+        1,
+        matching.steps,
+        matching.least_correlation,
+    )
+    good = inside & (fields[:, 3] > 0.0) & (fields[:, 5] >= 1.0) & (fields[:, 6] < 0.5)
+    fields[~good] = np.nan
+    return fields
 
 
 def first_slopes(inverse_depth_per_mm: Floats, spacing_px: float) -> tuple[Floats, Floats]:
@@ -171,24 +183,29 @@ _BEND_CELLS = 3.0
 """Curvature is taken over so many grid cells: less is noisier than what it mends (measured)."""
 
 
-def bent(map_: DepthMap, half_width_px: int) -> DepthMap:
-    """The map with its patches' curvature taken out, which a plane cannot follow.
+def bend(map_: DepthMap, half_width_px: int) -> Floats:
+    """By how much the curvature, which a plane cannot follow, lifts the patches of a map, (h, w).
 
     A plane fitted over ``-h..h`` pixels to a surface whose inverse depth bends by ``c`` and ``e``
     per pixel squared lies off its middle by ``(c + e) / 2`` times the mean of ``i^2``, which is
-    ``h (h + 1) / 3``. The bends are the change of the slopes from patch to patch.
+    ``h (h + 1) / 3``. The bends are the change of the slopes from patch to patch. 0 where a
+    neighbour is missing.
     """
     known = np.isfinite(map_.inverse_depth_per_mm)
     weight = np.maximum(ndimage.gaussian_filter(known.astype(np.float64), _BEND_CELLS), 1e-9)
-    bend = np.zeros(known.shape)
+    total = np.zeros(known.shape)
     for number, axis in ((0, 1), (1, 0)):
         slope = np.where(known, map_.slopes[..., number], 0.0)
         smooth = ndimage.gaussian_filter(slope, _BEND_CELLS) / weight
-        bend += np.gradient(smooth, map_.stride_px, axis=axis)
+        total += np.gradient(smooth, map_.stride_px, axis=axis)
     # At a rim the slopes of nothing would speak too.
     inner = ndimage.minimum_filter(known, 3)
-    off = bend * half_width_px * (half_width_px + 1) / 6.0
-    rho = map_.inverse_depth_per_mm - np.where(inner, off, 0.0)
+    return np.where(inner, total * half_width_px * (half_width_px + 1) / 6.0, 0.0)
+
+
+def bent(map_: DepthMap, half_width_px: int) -> DepthMap:
+    """The map with its patches' curvature taken out."""
+    rho = map_.inverse_depth_per_mm - bend(map_, half_width_px)
     return replace(map_, inverse_depth_per_mm=rho)
 
 

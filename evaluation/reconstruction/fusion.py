@@ -8,13 +8,14 @@ averaged with what the others say, along its normal.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
 from evaluation.reconstruction.depthmaps import DepthMap
+from evaluation.reconstruction.views import Bytes
 from geometry.arrays import Bools, Floats
 
 AGREE_MM = 0.5
@@ -35,46 +36,83 @@ same. Measured: the mean of three is 1.29 times surer than one, 1.73 would be in
 
 @dataclass(frozen=True, eq=False)
 class MeasuredPoints:
-    """Points of one depth map: where, how they face, how sure, from how many cameras.
+    """Points of one reference: where, how they face, how sure, from how many cameras.
 
     ``points_mm``, ``normals`` (N, 3) in the rig frame, normals towards the camera; ``sigma_mm``
-    (N,) along the normal; ``views`` (N,) cameras; ``columns`` and ``rows`` (N,) of the grid.
+    (N,) along the normal; ``views`` (N,) cameras; ``pixels`` (N, 2) column and row; ``per_mm2``
+    (N,) cells of the map's grid that a square millimetre of the surface fills.
     """
 
     points_mm: Floats
     normals: Floats
     sigma_mm: Floats
     views: NDArray[np.int8]
-    columns: NDArray[np.int64]
-    rows: NDArray[np.int64]
-    resolution: Floats
+    pixels: NDArray[np.int64]
+    per_mm2: Floats
+
+    def subset(self, keep: Bools) -> MeasuredPoints:
+        """The points of a mask (N,)."""
+        return MeasuredPoints(*(getattr(self, f.name)[keep] for f in fields(self)))
 
 
 def measured_points(map_: DepthMap) -> MeasuredPoints:
-    """All points of a depth map in the rig frame.
+    """All points of a depth map in the rig frame."""
+    rows, columns = np.nonzero(np.isfinite(map_.inverse_depth_per_mm))
+    return points_of(
+        map_,
+        np.column_stack([columns, rows]) * map_.stride_px,
+        map_.inverse_depth_per_mm[rows, columns],
+        map_.slopes[rows, columns],
+        map_.variance[rows, columns],
+        map_.views[rows, columns],
+    )
+
+
+def points_of(
+    map_: DepthMap,
+    pixels: NDArray[np.int64],
+    rho: Floats,
+    slopes: Floats,
+    variance: Floats,
+    views: NDArray[np.int8],
+) -> MeasuredPoints:
+    """Patches at ``pixels`` (N, 2) of a map's reference as points in the rig frame.
 
     The plane ``rho (u, v)`` of a patch is ``n . X = 1`` in the camera frame with
-    ``n = K' (a, b, rho - a u - b v)``: so its normal is exact too. ``resolution`` (N,) is the
-    pixels that a square millimetre of the surface fills.
+    ``n = K' (a, b, rho - a u - b v)``: so its normal is exact too.
     """
-    rows, columns = np.nonzero(np.isfinite(map_.inverse_depth_per_mm))
-    rho = map_.inverse_depth_per_mm[rows, columns]
-    slope = map_.slopes[rows, columns]
     view = map_.reference
-    u, v = columns * float(map_.stride_px), rows * float(map_.stride_px)
-    rays = np.column_stack([u, v, np.ones_like(u)]) @ np.linalg.inv(view.matrix).T
+    rays = np.column_stack([pixels, np.ones(len(pixels))]) @ np.linalg.inv(view.matrix).T
     turn = view.pose.rotation_rig_to_camera
-    points = (rays / rho[:, None]) @ turn + view.pose.position_rig_mm
-    plane = np.column_stack([slope, rho - slope[:, 0] * u - slope[:, 1] * v]) @ view.matrix
+    flat = rho - np.einsum("ij,ij->i", slopes, pixels)
+    plane = np.column_stack([slopes, flat]) @ view.matrix
     normals = -plane / np.linalg.norm(plane, axis=1, keepdims=True)
-    lengths = np.linalg.norm(rays, axis=1)
-    cosine = -np.einsum("ij,ij->i", normals, rays) / lengths
     # A step of the inverse depth moves the point along its ray; the normal takes its share.
-    sigma = np.sqrt(map_.variance[rows, columns]) / rho**2 * lengths * cosine
-    resolution = view.matrix[0, 0] ** 2 * rho**2 * np.maximum(cosine, 0.0)
+    across = -np.einsum("ij,ij->i", normals, rays)
+    cosine = across / np.linalg.norm(rays, axis=1)
+    points = (rays / rho[:, None]) @ turn + view.pose.position_rig_mm
+    distance = np.linalg.norm(rays, axis=1) / rho
     return MeasuredPoints(
-        points, normals @ turn, sigma, map_.views[rows, columns], columns, rows, resolution
+        points,
+        normals @ turn,
+        np.sqrt(variance) / rho**2 * across,
+        views,
+        pixels,
+        _cells_per_mm2(map_, distance, cosine),
     )
+
+
+def _cells_per_mm2(map_: DepthMap, distance_mm: Floats, cosine: Floats) -> Floats:
+    focal = map_.reference.matrix[0, 0] / map_.stride_px
+    return np.asarray(focal**2 / distance_mm**2 * np.maximum(cosine, 0.0))
+
+
+def _per_mm2(map_: DepthMap, points: MeasuredPoints) -> Floats:
+    """Cells of a map's grid that a square millimetre of the surface at each point fills, (N,)."""
+    rays = points.points_mm - map_.reference.pose.position_rig_mm
+    distance = np.linalg.norm(rays, axis=1)
+    cosine = -np.einsum("ij,ij->i", points.normals, rays) / distance
+    return _cells_per_mm2(map_, distance, cosine)
 
 
 def _seen_in(map_: DepthMap, points: MeasuredPoints) -> tuple[Bools, Floats, Floats, Floats]:
@@ -128,14 +166,11 @@ def best_references(maps: Sequence[DepthMap], most: int) -> list[Bools]:
             if other_number == number:
                 continue
             known, along, _, _ = _seen_in(other, mine)
-            view = other.reference
-            rays = mine.points_mm - view.pose.position_rig_mm
-            distance = np.linalg.norm(rays, axis=1)
-            cosine = -np.einsum("ij,ij->i", mine.normals, rays) / distance
-            theirs = view.matrix[0, 0] ** 2 / distance**2 * np.maximum(cosine, 0.0)
-            better += known & (np.abs(along) < 4.0 * AGREE_MM) & (theirs > mine.resolution)
+            theirs = _per_mm2(other, mine)
+            better += known & (np.abs(along) < 4.0 * AGREE_MM) & (theirs > mine.per_mm2)
         mask = np.zeros(map_.inverse_depth_per_mm.shape, dtype=bool)
-        mask[mine.rows, mine.columns] = better < most
+        columns, rows = mine.pixels.T // map_.stride_px
+        mask[rows, columns] = better < most
         keep.append(mask)
     return keep
 
@@ -145,39 +180,45 @@ class FusedPoints:
     """What is left of one reference's points after the others were heard.
 
     ``apart`` (N,): how far the surface of the surest other reference lies off, in standard
-    deviations of the difference as the two predict it; NaN where none measured it.
+    deviations of the difference as the two predict it; NaN where none measured it. ``per_mm2``
+    (N,): points that all references together have for a square millimetre there. ``colours``
+    (N, 3) as the reference shows them.
     """
 
     points_mm: Floats
     normals: Floats
     sigma_mm: Floats
     views: NDArray[np.int64]
-    columns: NDArray[np.int64]
-    rows: NDArray[np.int64]
+    pixels: NDArray[np.int64]
     apart: Floats
+    per_mm2: Floats
+    colours: Bytes
 
     def subset(self, keep: Bools) -> FusedPoints:
         """The points of a mask (N,)."""
-        return FusedPoints(
-            self.points_mm[keep],
-            self.normals[keep],
-            self.sigma_mm[keep],
-            self.views[keep],
-            self.columns[keep],
-            self.rows[keep],
-            self.apart[keep],
-        )
+        return FusedPoints(*(getattr(self, f.name)[keep] for f in fields(self)))
 
 
-def fused(maps: Sequence[DepthMap], number: int) -> FusedPoints:
-    """The points of map ``number`` that hold, each averaged with what other maps say of it."""
-    mine = measured_points(maps[number])
+def joined(parts: Sequence[FusedPoints]) -> FusedPoints:
+    """All points of all parts (one at least), in their order."""
+    return FusedPoints(
+        *(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(FusedPoints))
+    )
+
+
+def fused(maps: Sequence[DepthMap], number: int, mine: MeasuredPoints | None = None) -> FusedPoints:
+    """The points of map ``number`` that hold, each averaged with what other maps say of it.
+
+    ``mine``: other points of the same reference instead.
+    """
+    mine = measured_points(maps[number]) if mine is None else mine
     count = len(mine.points_mm)
     weight = 1.0 / np.maximum(mine.sigma_mm**2, 1e-12)
     total, shift = weight.copy(), np.zeros(count)
     support = np.zeros(count, dtype=np.int64)
     against = np.zeros(count, dtype=np.int64)
     apart, least = np.full(count, np.nan), np.full(count, np.inf)
+    per_mm2 = mine.per_mm2.copy()
     for other_number, other in enumerate(maps):
         if other_number == number:
             continue
@@ -187,6 +228,7 @@ def fused(maps: Sequence[DepthMap], number: int) -> FusedPoints:
         shift += np.where(agree, w * along, 0.0)
         total += w
         support += agree
+        per_mm2 += np.where(agree, _per_mm2(other, mine), 0.0)
         surer = agree & (variance < least)
         both = np.sqrt(mine.sigma_mm**2 + variance)
         apart, least = np.where(surer, along / both, apart), np.where(surer, variance, least)
@@ -196,14 +238,16 @@ def fused(maps: Sequence[DepthMap], number: int) -> FusedPoints:
     moved = mine.points_mm + (shift / total)[:, None] * mine.normals
     # The maps share pictures: a mean of n, each correlated by r with each, has (1 + (n - 1) r) / n.
     sigma = np.sqrt((1.0 + SHARED * support) / total)
+    columns, rows = mine.pixels[keep].T
     return FusedPoints(
         moved[keep],
         mine.normals[keep],
         sigma[keep],
         (1 + mine.views.astype(np.int64) + support)[keep],
-        mine.columns[keep],
-        mine.rows[keep],
+        mine.pixels[keep],
         apart[keep],
+        per_mm2[keep],
+        maps[number].reference.colour[rows, columns],
     )
 
 

@@ -14,8 +14,8 @@ BEST_DEG = 14.0
 """Semi-global matching finds most between 10 and 18 degrees: nearer pairs are noisy, farther ones
 look too different."""
 
-FARTHEST_DEG = 40.0
-"""Beyond, skin looks too different for one patch model; nothing is gained by such a view."""
+NEAREST_DEG = 1.0
+"""Below, the rays of two cameras are parallel as far as depth is concerned."""
 
 
 def ray_angles_deg(views: Sequence[View], volume: Volume) -> Floats:
@@ -25,15 +25,21 @@ def ray_angles_deg(views: Sequence[View], volume: Volume) -> Floats:
     return np.asarray(np.degrees(np.arccos(np.clip(rays @ rays.T, -1.0, 1.0))))
 
 
-def partners(angles_deg: Floats, reference: int, most: int) -> tuple[int, ...]:
+def _within(row_deg: Floats, reference: int, farthest_deg: float) -> list[int]:
+    return [k for k, a in enumerate(row_deg) if k != reference and NEAREST_DEG <= a <= farthest_deg]
+
+
+def partners(angles_deg: Floats, reference: int, most: int, farthest_deg: float) -> tuple[int, ...]:
     """The cameras best paired with ``reference`` for coarse depth, best first."""
     row = angles_deg[reference]
-    others = [k for k in range(len(row)) if k != reference and 1.0 <= row[k] <= FARTHEST_DEG]
+    others = _within(row, reference, farthest_deg)
     return tuple(sorted(others, key=lambda k: abs(np.log(row[k] / BEST_DEG)))[:most])
 
 
-def companions(angles_deg: Floats, reference: int, most: int) -> tuple[int, ...]:
+def companions(
+    angles_deg: Floats, reference: int, most: int, farthest_deg: float
+) -> tuple[int, ...]:
     """The cameras that refine points of ``reference``: the nearest within the limit."""
     row = angles_deg[reference]
-    others = [k for k in range(len(row)) if k != reference and 1.0 <= row[k] <= FARTHEST_DEG]
+    others = _within(row, reference, farthest_deg)
     return tuple(sorted(others, key=lambda k: row[k])[:most])

@@ -5,8 +5,9 @@
 3. Which cameras see each piece of surface best; only those measure it in full size.
 4. Patches on full-size pictures (:mod:`.depthmaps`).
 5. Fusion: agreement between cameras, mean along the normal (:mod:`.fusion`).
-6. Points that stand off their neighbours' surface go (:mod:`.neighbours`).
-7. Each picture is asked whether it shows the surface where it should (:mod:`.agreement`).
+6. More patches where points lie thin (:mod:`.between`), fused with the maps of 4.
+7. Points that stand off their neighbours' surface go (:mod:`.neighbours`).
+8. Each picture is asked whether it shows the surface where it should (:mod:`.agreement`).
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from common.progress import (
     ignore_progress,
 )
 from evaluation.reconstruction.agreement import Doubt, doubts, pair_agreement
+from evaluation.reconstruction.between import filled, gaps, guesses
 from evaluation.reconstruction.cloud import Cloud
 from evaluation.reconstruction.depthmaps import (
     DepthMap,
@@ -40,15 +42,26 @@ from evaluation.reconstruction.depthmaps import (
     steady,
     upsampled,
 )
-from evaluation.reconstruction.fusion import FusedPoints, best_references, boldness, fused
+from evaluation.reconstruction.fusion import FusedPoints, best_references, boldness, fused, joined
 from evaluation.reconstruction.neighbours import on_surface
 from evaluation.reconstruction.pairs import companions, partners, ray_angles_deg
 from evaluation.reconstruction.views import View, memory_told
 from evaluation.reconstruction.volume import Volume, common_volume
 from geometry.arrays import Bools, Floats
+from solver.matching import Matching as CanMatch
 
 SHARES = {"coarse": 0.1, "half": 0.35, "full": 0.85, "fusion": 0.95, "surface": 1.0}
 """How far the work has come at the end of each step, measured on seven cameras."""
+
+THIN = 0.8
+"""Of the usual density: where points are denser, their grids leave no gaps to speak of."""
+
+GAP_STEPS = 2
+"""Steps of a patch that begins on the plane of its neighbour: half a pixel and less to go."""
+
+SURE_TIMES, SURE_SIGMAS = 1.5, 4.0
+"""Gaps lie beside creases too, where patches err: one in a gap counts when its sigma is at most so
+many times the usual one, and the next reference's surface at most so many sigmas off."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +70,10 @@ class ReconstructionOptions:
 
     ``references`` cameras measure each piece of surface; ``stride_px`` between the patches of
     the full-size pictures; ``partners`` pairs a camera for coarse depth; ``companions`` views
-    beside the reference in a patch. ``stray_mm``: points farther off their neighbours go.
+    beside the reference in a patch. ``stray_mm``: points farther off their neighbours go. A
+    place that is farther from all points than ``gap`` times their usual spacing gets one more.
+    Cameras whose rays to the subject meet at more than ``farthest_deg`` are not matched: skin
+    looks too different for one patch model.
     """
 
     references: int = 3
@@ -66,6 +82,8 @@ class ReconstructionOptions:
     stride_px: int = 2
     growth: int = 3
     stray_mm: float = 0.05
+    gap: float = 0.85
+    farthest_deg: float = CanMatch().max_angle_deg
     half: Matching = field(default_factory=lambda: Matching(half_width_samples=4, steps=6))
     full: Matching = field(default_factory=lambda: Matching(half_width_samples=4, steps=5))
     workers: int = 2
@@ -149,10 +167,48 @@ def _reconstructed(
         tried.append(number)
     parts = []
     for k in range(count):
-        report.step("fusion", k, count)
+        report.step("fusion", k, 2 * count)
         parts.append(_inside(fused(fulls, k), network.volume))
+    for k, more in _more(network, fulls, parts, options, report):
+        parts[k] = joined([parts[k], more])
     report.step("surface", 0, 1)
     return replace(_result(network, fulls, parts, tried, options), doubts=_doubts(network, fulls))
+
+
+def _more(
+    network: _Network,
+    maps: Sequence[DepthMap],
+    parts: Sequence[FusedPoints],
+    options: ReconstructionOptions,
+    report: _Reporter,
+) -> list[tuple[int, FusedPoints]]:
+    """Cameras and their points where those that are there, ``parts``, leave gaps."""
+    points = joined(parts)
+    if len(points.points_mm) == 0:
+        return []
+    usual = float(np.median(points.per_mm2))
+    least_mm = options.gap / usual**0.5
+    how = replace(options.full, steps=GAP_STEPS)
+    places, planes = [], []
+    for map_, part in zip(maps, parts, strict=True):
+        thin = np.zeros(map_.inverse_depth_per_mm.shape, dtype=bool)
+        columns, rows = part.pixels[part.per_mm2 < THIN * usual].T // map_.stride_px
+        thin[rows, columns] = True
+        place, plane = guesses(map_, thin, least_mm)
+        places.append(place)
+        planes.append(plane)
+    found = []
+    for k, take in enumerate(gaps(places, points.points_mm, least_mm)):
+        report.step("fusion", len(maps) + k, 2 * len(maps))
+        if not take.any():
+            continue
+        others = [network.full[n] for n in network.companions[k]]
+        scale = network.scale_px_mm(k, network.full)
+        more = filled(maps[k], others, places[k].pixels[take], planes[k][take], how, scale)
+        made = _inside(fused(maps, k, more), network.volume)
+        sure = made.sigma_mm <= SURE_TIMES * float(np.median(points.sigma_mm))
+        found.append((k, made.subset(sure & (np.abs(made.apart) <= SURE_SIGMAS))))
+    return found
 
 
 def _doubts(network: _Network, maps: Sequence[DepthMap]) -> tuple[Doubt, ...]:
@@ -184,12 +240,15 @@ class _Reporter:
 def _network(views: Sequence[View], volume: Volume, options: ReconstructionOptions) -> _Network:
     angles = ray_angles_deg(views, volume)
     count = len(views)
-    pairs = tuple(partners(angles, k, options.partners) for k in range(count))
-    near = tuple(companions(angles, k, options.companions) for k in range(count))
+    pairs = tuple(partners(angles, k, options.partners, options.farthest_deg) for k in range(count))
+    near = tuple(
+        companions(angles, k, options.companions, options.farthest_deg) for k in range(count)
+    )
     if not any(pairs):
         raise InputError(
             "cameras-apart",
-            "no two cameras see the subject from directions less than 40 degrees apart",
+            "no two cameras see the subject from directions less than "
+            f"{options.farthest_deg:g} degrees apart",
             "give more cameras, or cameras that stand nearer to one another",
         )
     half = tuple(v.reduced() for v in views)
@@ -288,12 +347,7 @@ def _result(
     sigma *= boldness(points, np.concatenate([p.apart for p in parts]))
     owner = np.repeat(np.arange(len(parts)), [len(p.points_mm) for p in parts])
     keep = on_surface(points, normals, sigma, options.stray_mm, options.workers)
-    colours = np.concatenate(
-        [
-            m.reference.colour[p.rows * m.stride_px, p.columns * m.stride_px]
-            for m, p in zip(maps, parts, strict=True)
-        ]
-    )
+    colours = np.concatenate([p.colours for p in parts])
     cloud = Cloud(
         points[keep],
         normals[keep],

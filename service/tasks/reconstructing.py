@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +26,7 @@ from evaluation.reconstruction.surface import SurfaceMesh, meshed
 from evaluation.reconstruction.views import View, view_of
 from evaluation.report.pages import reconstruction_page
 from geometry.camera import RigCamera
-from rig.design.designfile import read_design
+from rig.design.designfile import ReadDesign, read_design
 from service.jobs.engine import Running, Task
 from service.kinds.reconstruction import (
     CameraPart,
@@ -53,14 +54,12 @@ def reconstruction(
     The cameras come from the input ``calibration``, or ``design`` where they are as designed.
     """
     require_numba()
-    cameras = _cameras(task.inputs)
+    design = read_design(task.inputs["design"]) if "design" in task.inputs else None
+    cameras = _cameras(task.inputs, design)
     with tempfile.TemporaryDirectory(prefix="pictures-", dir=task.folder.parent) as temporary:
         frame, chosen = _one_frame(taken_pictures(task, Path(temporary)), task.request.frame)
         views = _views(cameras, chosen, running)
-    options = ReconstructionOptions(
-        stride_px=task.request.stride_px, workers=max(task.run.workers, 1)
-    )
-
+    options = matching_options(design, task.request.stride_px, task.run.workers)
     matching = within(running.report, READING, MATCHING, "matching")
     done = reconstruct(views, options=options, progress=matching, cancel=running.cancel)
     missing = sorted({c.name for c in cameras} - {v.name for v in views})
@@ -87,11 +86,21 @@ def _shown(mesh: SurfaceMesh, done: Reconstruction, workers: int) -> SurfaceMesh
     return meshed(done.cloud, (2.5 * mesh.area_mm2() / SHOWN_FACES) ** 0.5, workers)
 
 
-def _cameras(inputs: Mapping[str, Path]) -> tuple[RigCamera, ...]:
+def matching_options(
+    design: ReadDesign | None, stride_px: int, workers: int
+) -> ReconstructionOptions:
+    """How to match: pairs within the angle that the design's rig file counts on."""
+    options = ReconstructionOptions(stride_px=stride_px, workers=max(workers, 1))
+    if design is None or design.file.rig is None:
+        return options
+    return replace(options, farthest_deg=design.file.rig.matching.max_angle_deg)
+
+
+def _cameras(inputs: Mapping[str, Path], design: ReadDesign | None) -> tuple[RigCamera, ...]:
+    like = design.cameras if design is not None else ()
     if "calibration" in inputs:
-        like = read_design(inputs["design"]).cameras if "design" in inputs else ()
         return rig_cameras(read_calibration(inputs["calibration"]).calibration.cameras, like)
-    return read_design(inputs["design"]).cameras
+    return like
 
 
 def _one_frame(pictures: Sequence[Picture], wanted: str | None) -> tuple[str, dict[str, Picture]]:

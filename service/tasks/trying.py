@@ -10,7 +10,6 @@ from common.progress import Progress
 from evaluation.comparison.comparing import Figures
 from evaluation.extras import igl, require_numba
 from evaluation.reconstruction.cloudfile import write_cloud, write_distances
-from evaluation.reconstruction.reconstructing import ReconstructionOptions
 from evaluation.report.trialpage import trial_page
 from evaluation.trial.trying import Trial, try_rig
 from geometry.scanoptions import ScanOptions
@@ -19,6 +18,7 @@ from rig.simulation.settings import HeadSettings, SceneSettings
 from service.jobs.engine import Running, Task
 from service.kinds.comparison import Share
 from service.kinds.trial import RegionPart, TrialRequest, TrialResult
+from service.tasks.reconstructing import matching_options
 
 REACH_MM = 0.5
 """At which distance from a point the verdict asks for completeness."""
@@ -41,9 +41,7 @@ def trial(task: Task[TrialRequest, TrialResult], running: Running) -> TrialResul
         scene,
         exposure=request.exposure,
         radius_mm=request.radius_mm,
-        options=ReconstructionOptions(
-            stride_px=request.stride_px, workers=max(task.run.workers, 1)
-        ),
+        options=matching_options(design, request.stride_px, task.run.workers),
         progress=running.report,
         cancel=running.cancel,
     )

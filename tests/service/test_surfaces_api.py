@@ -6,6 +6,7 @@ import io
 import json
 import zipfile
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +19,9 @@ from service_helpers import InThisProcess, TestClient, wait_for
 
 from common.progress import CancelToken, ProgressCallback
 from evaluation.reconstruction.cloudfile import read_points, write_distances
-from rig.design.designfile import placed_camera
+from rig.design.designfile import design_from_mapping, placed_camera
 from rig.specification.examples import example_rig
+from rig.specification.rigfile import RigFile
 from service.api.app import create_app
 from service.api.context import Service
 from service.jobs.engine import Task
@@ -27,6 +29,8 @@ from service.kinds.base import RequestT, ResultT
 from service.kinds.queued import QUEUED
 from service.settings import read_settings
 from service.store.jobrecords import NewJob
+from service.tasks.reconstructing import matching_options
+from solver.matching import Matching
 
 JSON = dict[str, Any]
 pytest.importorskip("igl")
@@ -174,6 +178,21 @@ def test_pictures_of_no_known_camera_are_told(
     nowhere = client.post("/v1/reconstructions", json={"pictures": pictures})
     assert "give calibration_id, or design_id" in nowhere.json()["errors"][0]["message"]
     assert client.get("/v1/reconstructions").json()["items"][0]["id"] == job["id"]
+
+
+def test_cameras_are_matched_up_to_the_angle_that_the_design_counts_on() -> None:
+    spec = example_rig("face")
+    spec = replace(spec, limits=replace(spec.limits, matching=Matching(max_angle_deg=25.0)))
+    document: JSON = {
+        "schema": "rigwright.design/1",
+        "cameras": [placed_camera(camera) for camera in small_rig(spec.camera, np.zeros(3))],
+    }
+    plain = design_from_mapping(document)
+    told = design_from_mapping(
+        document | {"rig": RigFile.from_spec(spec).model_dump(by_alias=True, exclude_none=True)}
+    )
+    assert matching_options(told, 3, 0) == replace(matching_options(None, 3, 1), farthest_deg=25.0)
+    assert matching_options(plain, 3, 1) == matching_options(None, 3, 1)
 
 
 @pytest.mark.slow

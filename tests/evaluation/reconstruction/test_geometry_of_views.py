@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from common.errors import InputError
+from evaluation.reconstruction.between import gaps, guesses
 from evaluation.reconstruction.depthmaps import DepthMap, bent, relations
-from evaluation.reconstruction.fusion import SHARED, boldness, fused, measured_points
+from evaluation.reconstruction.fusion import SHARED, boldness, fused, joined, measured_points
 from evaluation.reconstruction.neighbours import on_surface
 from evaluation.reconstruction.pairs import companions, partners, ray_angles_deg
 from evaluation.reconstruction.views import View, memory_told
@@ -61,9 +62,11 @@ def test_parallel_cameras_have_no_common_volume() -> None:
 
 def test_partners_stand_at_the_angle_that_matches_best() -> None:
     angles = np.abs(np.subtract.outer([0.0, 6.0, 13.0, 30.0, 70.0], [0.0, 6.0, 13.0, 30.0, 70.0]))
-    assert partners(angles, 0, 2) == (2, 3)
-    assert companions(angles, 0, 4) == (1, 2, 3)
-    assert partners(angles, 4, 2) == (3,)
+    assert partners(angles, 0, 2, 40.0) == (2, 3)
+    assert companions(angles, 0, 4, 40.0) == (1, 2, 3)
+    assert partners(angles, 4, 2, 40.0) == (3,)
+    assert partners(angles, 4, 2, 39.0) == ()
+    assert companions(angles, 0, 4, 29.0) == (1, 2)
 
 
 def test_rays_to_the_middle_make_the_angles() -> None:
@@ -92,6 +95,29 @@ def test_points_of_an_exact_map_lie_on_the_plane_and_face_the_camera() -> None:
     assert np.abs(points.points_mm @ normal).max() < 1e-9
     # A plane's inverse depth is linear in the picture, so differences are exact too.
     assert points.normals == pytest.approx(np.broadcast_to(normal, points.normals.shape), abs=1e-9)
+
+
+def test_the_density_of_fused_points_is_that_of_all_maps_together() -> None:
+    maps = [exact_map(view) for view in scenes.plane_views()[:2]]
+    points = joined([fused(maps, 0), fused(maps, 1)])
+    middle = np.linalg.norm(points.points_mm, axis=1) < 20.0
+    disc_mm2 = np.pi * 20.0**2
+    # Cells of 1.4 mm: the rim cuts 90 of each grid's 640, a tenth of which may fall either way.
+    assert points.per_mm2[middle].mean() == pytest.approx(middle.sum() / disc_mm2, rel=0.03)
+
+
+def test_a_gap_is_filled_once_by_the_picture_that_shows_most_of_it() -> None:
+    maps = [exact_map(view) for view in scenes.plane_views()[:2]]
+    # The second camera's guesses count as if it stood nearer.
+    places = [guesses(m, np.ones(m.inverse_depth_per_mm.shape, dtype=bool), 0.0)[0] for m in maps]
+    places[1] = replace(places[1], per_mm2=places[1].per_mm2 * 9.0)
+    points = np.concatenate([measured_points(m).points_mm for m in maps])
+    hole = np.linalg.norm(points, axis=1) < 10.0
+    take = gaps(places, points[~hole], 1.2)
+    at = np.concatenate([p.points_mm[t] for p, t in zip(places, take, strict=True)])
+    assert len(at) > 100 and np.linalg.norm(at, axis=1).max() < 10.0
+    assert len(np.unique(np.floor(at / 1.2), axis=0)) == len(at)
+    assert take[1].sum() > 5 * take[0].sum()
 
 
 def test_stray_points_and_rims_go_and_the_surface_stays() -> None:

@@ -6,6 +6,7 @@ import matching_scenes as scenes
 import numpy as np
 import pytest
 
+from evaluation.reconstruction.between import filled, gaps, guesses
 from evaluation.reconstruction.depthmaps import Matching, refined
 from evaluation.reconstruction.fusion import measured_points
 
@@ -61,3 +62,36 @@ def test_a_view_of_something_else_is_left_out() -> None:
     inside = np.isfinite(found.inverse_depth_per_mm)
     assert np.median(found.views[inside]) == 2
     assert np.median(np.abs(1 / found.inverse_depth_per_mm - 1 / truth)[inside]) < 0.03
+
+
+def test_gaps_are_filled_between_patches_and_a_step_beyond_their_rim() -> None:
+    views = scenes.plane_views()
+    truth = scenes.true_inverse_depth(views[0])
+    start = truth[::4, ::4].copy()
+    start[:, 40:] = np.nan
+    slopes = np.zeros((*start.shape, 2))
+    how = Matching(half_width_samples=4, steps=8)
+    coarse = refined(views[0], views[1:], start, slopes, 4, how)
+    known = np.isfinite(coarse.inverse_depth_per_mm)
+    thin = known.copy()
+    thin[:, :20] = False
+    points = measured_points(coarse).points_mm
+    place, plane = guesses(coarse, thin, 1.1)
+    # A cell is 1.9 mm wide: its middle lies 1.3 mm from its corners, the middles of its sides 0.9.
+    (take,) = gaps([place], points, 1.1)
+    pixels = place.pixels[take]
+    made = filled(coarse, views[1:], pixels, plane[take], how, scenes.FOCAL_PX * 115.0)
+    columns, rows = made.pixels.T
+    middle = (columns % 4 == 2) & (rows % 4 == 2)
+    beyond = (columns % 4 == 0) & (rows % 4 == 0)
+    assert (middle | beyond).all()
+    assert columns[beyond].max() == 160
+    assert not known[rows[beyond] // 4, columns[beyond] // 4].any()
+    assert thin[rows[middle] // 4, columns[middle] // 4].all()
+    assert middle.sum() > 0.95 * thin.sum()
+    # As for the coarse patches themselves, see above.
+    rho = 1 / truth[rows, columns]
+    local = (made.points_mm - views[0].pose.position_rig_mm) @ views[
+        0
+    ].pose.rotation_rig_to_camera.T
+    assert np.median(np.abs(local[:, 2] - rho)) < 0.02
