@@ -73,7 +73,7 @@ class ReconstructionOptions:
     beside the reference in a patch. ``stray_mm``: points farther off their neighbours go. A
     place that is farther from all points than ``gap`` times their usual spacing gets one more.
     Cameras whose rays to the subject meet at more than ``farthest_deg`` are not matched: skin
-    looks too different for one patch model.
+    looks too different for one patch model. ``keep_maps`` keeps the depth maps of all cameras.
     """
 
     references: int = 3
@@ -87,6 +87,7 @@ class ReconstructionOptions:
     half: Matching = field(default_factory=lambda: Matching(half_width_samples=4, steps=6))
     full: Matching = field(default_factory=lambda: Matching(half_width_samples=4, steps=5))
     workers: int = 2
+    keep_maps: bool = False
 
 
 @dataclass(frozen=True)
@@ -103,13 +104,15 @@ class CameraShare:
 class Reconstruction:
     """A cloud, the volume it was looked for in, and what each camera gave to it.
 
-    ``doubts``: the cameras whose picture the others speak against.
+    ``doubts``: the cameras whose picture the others speak against. ``maps``: what each camera
+    measured before the others were heard, where they were to be kept.
     """
 
     cloud: Cloud
     volume: Volume
     cameras: tuple[CameraShare, ...]
     doubts: tuple[Doubt, ...] = ()
+    maps: tuple[DepthMap, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,7 +175,11 @@ def _reconstructed(
     for k, more in _more(network, fulls, parts, options, report):
         parts[k] = joined([parts[k], more])
     report.step("surface", 0, 1)
-    return replace(_result(network, fulls, parts, tried, options), doubts=_doubts(network, fulls))
+    return replace(
+        _result(network, fulls, parts, tried, options),
+        doubts=_doubts(network, fulls),
+        maps=tuple(fulls) if options.keep_maps else (),
+    )
 
 
 def _more(

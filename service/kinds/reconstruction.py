@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -29,6 +29,14 @@ class ReconstructionRequest(Request):
             "of the points.",
         ),
     ] = None
+    meshes: Annotated[
+        tuple[Literal["ply", "glb", "obj"], ...],
+        Field(max_length=3, description="How to write the surface: mesh.ply, mesh.glb, mesh.obj."),
+    ] = ("ply", "glb")
+    depth_maps: Annotated[
+        bool,
+        Field(description="Whether to write what each camera measured, as depthmaps/CAMERA.tif."),
+    ] = False
 
 
 class CameraPart(Result):

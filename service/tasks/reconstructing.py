@@ -16,7 +16,8 @@ from common.errors import InputError
 from common.progress import Progress, within
 from evaluation.extras import require_numba
 from evaluation.reconstruction.cloudfile import write_cloud
-from evaluation.reconstruction.meshfile import mesh_glb, mesh_ply
+from evaluation.reconstruction.depthfile import write_depth_maps
+from evaluation.reconstruction.meshfile import MESHES
 from evaluation.reconstruction.reconstructing import (
     Reconstruction,
     ReconstructionOptions,
@@ -49,7 +50,7 @@ SHOWN_FACES = 60_000
 def reconstruction(
     task: Task[ReconstructionRequest, ReconstructionResult], running: Running
 ) -> ReconstructionResult:
-    """Write ``cloud.ply``, ``mesh.ply``, ``mesh.glb`` and ``report.html``.
+    """Write ``cloud.ply``, the mesh, the depth maps that were asked for, and ``report.html``.
 
     The cameras come from the input ``calibration``, or ``design`` where they are as designed.
     """
@@ -59,15 +60,20 @@ def reconstruction(
     with tempfile.TemporaryDirectory(prefix="pictures-", dir=task.folder.parent) as temporary:
         frame, chosen = _one_frame(taken_pictures(task, Path(temporary)), task.request.frame)
         views = _views(cameras, chosen, running)
-    options = matching_options(design, task.request.stride_px, task.run.workers)
+    options = replace(
+        matching_options(design, task.request.stride_px, task.run.workers),
+        keep_maps=task.request.depth_maps,
+    )
     matching = within(running.report, READING, MATCHING, "matching")
     done = reconstruct(views, options=options, progress=matching, cancel=running.cancel)
     missing = sorted({c.name for c in cameras} - {v.name for v in views})
     running.report(Progress("meshing", MATCHING))
     mesh = meshed(done.cloud, task.request.cell_mm, options.workers)
     write_cloud(task.folder / "cloud.ply", done.cloud)
-    (task.folder / "mesh.ply").write_bytes(mesh_ply(mesh))
-    (task.folder / "mesh.glb").write_bytes(mesh_glb(mesh))
+    for ending in task.request.meshes:
+        (task.folder / f"mesh.{ending}").write_bytes(MESHES[ending](mesh))
+    if task.request.depth_maps:
+        write_depth_maps(task.folder / "depthmaps", done.maps)
     running.report(Progress("drawing", 0.97))
     title = task.request.name or f"Reconstruction of {frame}"
     notes = [f"No picture of {', '.join(missing)}."] if missing else []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -15,6 +16,14 @@ from service.cli.options import (
     PicturesArgument,
     WorkersOption,
 )
+
+
+class MeshEnding(StrEnum):
+    """How a surface is written."""
+
+    PLY = "ply"
+    GLB = "glb"
+    OBJ = "obj"
 
 
 def reconstruct(
@@ -52,6 +61,17 @@ def reconstruct(
             show_default=False,
         ),
     ] = None,
+    mesh: Annotated[
+        list[MeshEnding] | None,
+        typer.Option(
+            help="How to write the surface, ply and glb without it; can be given several times.",
+            show_default=False,
+        ),
+    ] = None,
+    depth_maps: Annotated[
+        bool,
+        typer.Option("--depth-maps", help="Write what each camera measured, as pictures of mm."),
+    ] = False,
     name: Annotated[str, typer.Option(help="What to call it.")] = "",
     workers: WorkersOption = None,
     as_json: JsonOption = False,
@@ -60,7 +80,8 @@ def reconstruct(
     """Reconstruct the surface that the pictures of one capture show.
 
     Writes the points with normals, colours and sigmas (cloud.ply), the surface through them
-    (mesh.ply, mesh.glb) and a page with the surface to turn. Needs the extra 'evaluation'.
+    (mesh.ply, mesh.glb, mesh.obj) and a page with the surface to turn. Needs the extra
+    'evaluation'.
 
     Exit code: 0 done, 2 bad input, 130 interrupted.
 
@@ -69,6 +90,7 @@ def reconstruct(
     from common.errors import InputError
     from common.files.folders import new_folder
     from common.files.ownership import files_of
+    from common.files.strict import validated
     from service.cli.output import print_result_json
     from service.cli.pictures import picture_source, reference_file
     from service.cli.running import one_line_errors, run_task
@@ -89,7 +111,11 @@ def reconstruct(
             inputs["calibration"] = reference_file(calibration)
         if design is not None:
             inputs["design"] = design
-        request = ReconstructionRequest(name=name, frame=frame, stride_px=stride, cell_mm=cell)
+        asked = {
+            "name": name, "frame": frame, "stride_px": stride, "cell_mm": cell,
+            "meshes": mesh or (MeshEnding.PLY, MeshEnding.GLB), "depth_maps": depth_maps,
+        }  # fmt: skip
+        request = validated(ReconstructionRequest, asked, "the reconstruction")
         with new_folder(out, force=force, spare=[pictures, *inputs.values()]) as folder:
             result = run_task(RECONSTRUCTION, request, inputs, folder, source.run)
         if as_json:

@@ -13,7 +13,7 @@ from common.errors import InputError
 from evaluation.comparison.referencefile import read_reference
 from evaluation.reconstruction.cloud import Cloud
 from evaluation.reconstruction.cloudfile import read_points
-from evaluation.reconstruction.meshfile import mesh_glb, mesh_ply
+from evaluation.reconstruction.meshfile import mesh_glb, mesh_obj, mesh_ply
 from evaluation.reconstruction.surface import SurfaceMesh, meshed, spacing_mm
 
 pytest.importorskip("igl")
@@ -86,6 +86,13 @@ def test_files_hold_what_the_mesh_holds(mesh: SurfaceMesh, tmp_path: Path) -> No
     path.write_bytes(mesh_ply(mesh))
     assert np.array_equal(read_points(path), mesh.vertices_mm)
     assert np.array_equal(read_reference(path).faces, mesh.faces)
+    obj = trimesh.load_mesh(io.BytesIO(mesh_obj(mesh)), file_type="obj", process=False)
+    # Six digits behind the point.
+    assert obj.vertices == pytest.approx(mesh.vertices_mm, abs=0.6e-6)
+    assert np.array_equal(obj.faces, mesh.faces)
+    assert np.array_equal(obj.visual.vertex_colors[:, :3], mesh.colours)
+    told = [line.split()[1:] for line in mesh_obj(mesh).decode().splitlines() if line[:2] == "vn"]
+    assert np.array(told, dtype=float) == pytest.approx(mesh.normals, abs=0.6e-6)
     glb = trimesh.load_scene(io.BytesIO(mesh_glb(mesh)), file_type="glb")
     (back,) = glb.geometry.values()
     # The hole looks up along Z of the rig, which is Y in glTF; metres in single precision.
