@@ -79,8 +79,8 @@ def _mixed(bench: Bench, numbers: Sequence[int]) -> Images:
     return out
 
 
-def _noise(shape: tuple[int, ...]) -> Coded:
-    return np.random.default_rng(1).integers(0, 255, shape, dtype=np.uint8)
+def _noise(shape: tuple[int, ...], seed: int = 0) -> Coded:
+    return np.random.default_rng(seed).integers(0, 255, shape, dtype=np.uint8)
 
 
 FAULTS: dict[str, Callable[[Bench], Images]] = {
@@ -101,7 +101,7 @@ FAULTS: dict[str, Callable[[Bench], Images]] = {
     "one of something else": lambda b: b.with_one(_noise(b.good[SPOILT].shape)),
     "one of the wrong size": lambda b: b.with_one(b.good[SPOILT][:-2]),
     "all black": lambda b: [np.zeros_like(image) for image in b.good],
-    "all of something else": lambda b: [_noise(image.shape) for image in b.good],
+    "all of something else": lambda b: [_noise(image.shape, k) for k, image in enumerate(b.good)],
     "two exchanged": lambda b: [b.good[k] for k in (1, 0, *range(2, len(b.good)))],
 }
 

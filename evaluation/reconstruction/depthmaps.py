@@ -117,7 +117,8 @@ def matched(
 
     reach = matching.half_width_samples
     width, height = reference.size_px
-    inside = (pixels >= reach).all(axis=1) & (pixels < [width - reach, height - reach]).all(axis=1)
+    far = pixels < [width - reach, height - reach]
+    inside = np.asarray((pixels >= reach).all(axis=1) & far.all(axis=1))
     inside[inside] = ~reference.clipped[pixels[inside, 1], pixels[inside, 0]]
     matrices, shifts = relations(reference, others)
     fields = np.full((len(pixels), FIELDS), np.nan)

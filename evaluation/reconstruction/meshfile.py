@@ -64,7 +64,9 @@ def mesh_obj(mesh: SurfaceMesh) -> bytes:
         vertex_colors=mesh.colours,
         process=False,
     )
-    text = export_obj(solid, include_normals=True, include_color=True, digits=6)
+    text = export_obj(  # type: ignore[no-untyped-call]
+        solid, include_normals=True, include_color=True, digits=6
+    )
     return str(text).encode()
 
 

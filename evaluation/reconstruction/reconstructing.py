@@ -56,6 +56,10 @@ SHARES = {"coarse": 0.1, "half": 0.35, "full": 0.85, "fusion": 0.95, "surface": 
 THIN = 0.8
 """Of the usual density: where points are denser, their grids leave no gaps to speak of."""
 
+LEAST_HELD = 0.05
+"""Share of the patches tried that become points: half and more in pictures of one instant, 0.6 %
+where three of seven cameras photographed another."""
+
 GAP_STEPS = 2
 """Steps of a patch that begins on the plane of its neighbour: half a pixel and less to go."""
 
@@ -71,8 +75,8 @@ class ReconstructionOptions:
     ``references`` cameras measure each piece of surface; ``stride_px`` between the patches of
     the full-size pictures; ``partners`` pairs a camera for coarse depth; ``companions`` views
     beside the reference in a patch. ``stray_mm``: points farther off their neighbours go. A
-    place that is farther from all points than ``gap`` times their usual spacing gets one more.
-    Cameras whose rays to the subject meet at more than ``farthest_deg`` are not matched: skin
+    place that is farther from all points than ``gap_ratio`` times their usual spacing gets one
+    more. Cameras whose rays to the subject meet at more than ``farthest_deg`` are not matched: skin
     looks too different for one patch model. ``keep_maps`` keeps the depth maps of all cameras.
     """
 
@@ -82,7 +86,7 @@ class ReconstructionOptions:
     stride_px: int = 2
     growth: int = 3
     stray_mm: float = 0.05
-    gap: float = 0.85
+    gap_ratio: float = 0.85
     farthest_deg: float = CanMatch().max_angle_deg
     half: Matching = field(default_factory=lambda: Matching(half_width_samples=4, steps=6))
     full: Matching = field(default_factory=lambda: Matching(half_width_samples=4, steps=5))
@@ -194,7 +198,7 @@ def _more(
     if len(points.points_mm) == 0:
         return []
     usual = float(np.median(points.per_mm2))
-    least_mm = options.gap / usual**0.5
+    least_mm = options.gap_ratio / usual**0.5
     how = replace(options.full, steps=GAP_STEPS)
     places, planes = [], []
     for map_, part in zip(maps, parts, strict=True):
@@ -334,6 +338,22 @@ def _inside(points: FusedPoints, volume: Volume) -> FusedPoints:
     return points.subset(np.linalg.norm(offset, axis=1) <= volume.radius_mm)
 
 
+def require_agreement(points: int, tried: int) -> None:
+    """Raises :class:`InputError` where too few of the patches tried became points."""
+    if points == 0:
+        raise InputError(
+            "nothing-matched",
+            "no surface could be matched in these pictures",
+            "check that they are of one capture, sharp, not black, and of these cameras",
+        )
+    if points < LEAST_HELD * tried:
+        raise InputError(
+            "pictures-contradict",
+            f"the pictures contradict one another: of {tried:,} places {points:,} hold in others",
+            "check that all are of one capture, and that the cameras stand as calibrated",
+        )
+
+
 def _result(
     network: _Network,
     maps: Sequence[DepthMap],
@@ -342,12 +362,7 @@ def _result(
     options: ReconstructionOptions,
 ) -> Reconstruction:
     points = np.concatenate([p.points_mm for p in parts])
-    if len(points) == 0:
-        raise InputError(
-            "nothing-matched",
-            "no surface could be matched in these pictures",
-            "check that they are of one capture, sharp, not black, and of these cameras",
-        )
+    require_agreement(len(points), sum(tried))
     normals = np.concatenate([p.normals for p in parts])
     sigma = np.concatenate([p.sigma_mm for p in parts])
     # What the normal equations cannot know shows in how far the cameras' surfaces lie apart.

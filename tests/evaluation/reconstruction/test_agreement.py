@@ -9,8 +9,10 @@ import matching_scenes as scenes
 import numpy as np
 import pytest
 
+from common.errors import InputError
 from evaluation.reconstruction.agreement import Doubt, doubts, pair_agreement
 from evaluation.reconstruction.depthmaps import DepthMap
+from evaluation.reconstruction.reconstructing import require_agreement
 from evaluation.reconstruction.views import View
 from geometry.frames import Pose
 
@@ -84,3 +86,13 @@ def test_of_two_cameras_none_is_blamed(views: list[View]) -> None:
     found = pair_agreement(maps, 0, 1, pair[1])
     assert found is not None
     assert doubts([found], ["cam1", "cam2"]) == ()
+
+
+@pytest.mark.parametrize(("points", "word"), [(0, "no surface"), (499, "contradict one another")])
+def test_pictures_that_hardly_agree_are_refused(points: int, word: str) -> None:
+    with pytest.raises(InputError, match=word):
+        require_agreement(points, 10_000)
+
+
+def test_half_of_the_patches_is_as_usual() -> None:
+    require_agreement(5_000, 10_000)
