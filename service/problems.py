@@ -50,6 +50,7 @@ STATUS_OF_CODE: Mapping[str, int] = {
     "input/body-slow": 408,
     "conflict/queue-full": 503,
     "conflict/not-ready": 503,
+    "conflict/too-many-look": 503,
     "internal/disk-full": 507,
     "conflict/disk-full": 507,
     "internal/stopping": 503,

@@ -40,6 +40,15 @@ def _read(data: bytes, flags: int) -> Image | None:
     return pixels  # type: ignore[return-value]  # its types say what other flags could give
 
 
+def jpeg(pixels: NDArray[np.uint8]) -> bytes:
+    """A JPEG of (H, W) or (H, W, 3) RGB pixels, to look at."""
+    import cv2
+
+    ordered = pixels[:, :, ::-1] if pixels.ndim == 3 else pixels
+    _, data = cv2.imencode(".jpg", ordered, [cv2.IMWRITE_JPEG_QUALITY, 85])
+    return data.tobytes()
+
+
 def png(pixels: Image) -> bytes | None:
     """A PNG of (H, W) or (H, W, 3) RGB pixels, 8 or 16 bits; None where they cannot be coded.
 

@@ -6,8 +6,14 @@ import csv
 import io
 import math
 from collections.abc import Iterable
-from typing import Any
+from pathlib import Path
+from typing import Annotated, Any, Literal
 
+import numpy as np
+from pydantic import BaseModel, Field, FiniteFloat, ValidationError
+
+from common.errors import InputError
+from geometry.arrays import Floats
 from rig.design.layout import DATUM_NOTE, Collision, Layout, Neighbour, Placement
 
 SCHEMA = "rigwright.layout/1"
@@ -105,6 +111,35 @@ def layout_document(layout: Layout) -> dict[str, Any]:
         "body_clearance": {"names": names, "clearance_mm": table},
         "collisions": [_collision(collision) for collision in layout.collisions],
     }
+
+
+class _Datum(BaseModel):
+    position_mm: Annotated[list[FiniteFloat], Field(min_length=3, max_length=3)]
+
+
+class _DatumOnly(BaseModel):
+    """What is read back of a layout; the rest of it is for others."""
+
+    layout_schema: Annotated[Literal["rigwright.layout/1"], Field(alias="schema")]
+    datum: _Datum
+
+
+def read_datum(path: Path) -> Floats | None:
+    """The datum (3,) in the rig frame that a layout file tells; None where there is no such file.
+
+    Raises :class:`InputError` ``layout-file`` for a file that is no layout.
+    """
+    try:
+        read = _DatumOnly.model_validate_json(path.read_bytes())
+    except FileNotFoundError:
+        return None
+    except (OSError, ValidationError) as error:
+        raise InputError(
+            "layout-file",
+            f"{path.name} beside the design is no layout of a rig ({type(error).__name__})",
+            "design the rig again, or take the file away",
+        ) from None
+    return np.array(read.datum.position_mm, dtype=np.float64)
 
 
 def _row(placement: Placement) -> list[Any]:

@@ -24,8 +24,9 @@ from rig.acquisition.cameras.base import (
 from rig.simulation.behaviour import CameraClock, Draw, camera_key, draw
 from rig.simulation.frames import SETTABLE, Coming, settled
 from rig.simulation.pool import RenderPool
+from rig.simulation.previews import awaited
 from rig.simulation.settings import SimulationSettings
-from rig.simulation.studio import Shot
+from rig.simulation.studio import Shot, Triple
 
 _BUFFERS = 32
 """Frames that the camera keeps between arming and collecting; more are lost and counted."""
@@ -79,7 +80,7 @@ class SimulatedCamera:
         self._spec: ArmSpec | None = None
         self._armed_ns = 0
         self._busy_until_ns = 0
-        self._free_runs = 0
+        self._free_runs = self._previews = self._capture = 0
         self._counts = Counter(dict.fromkeys(_COUNTED, 0))
         self._gone = False
         self.closed = False
@@ -109,6 +110,7 @@ class SimulatedCamera:
             frame_counter_modulus=self._simulation.counter_modulus,
             settable=SETTABLE,
             wait_overrun_s=math.inf if limit_s is None else limit_s,
+            previews=True,
         )
 
     def configure(self, settings: CameraSettings) -> CameraSettings:
@@ -128,6 +130,23 @@ class SimulatedCamera:
             self._spec, self._armed_ns, self._free_runs = spec, now, 0
             if self._faults.extra_frame_at_start:
                 self._expose(Triggered(self._armed_ns, None), free=True)
+
+    def preview(self, over: Callable[[], bool]) -> Frame | None:
+        """The scene at rest, in a picture of few pixels."""
+        self._answer()
+        with self._changed:
+            if self._spec is not None or over():
+                return None
+            self._previews += 1
+            now = self._clock()
+            # Numbers of captures begin with 1: their noise is never that of a live picture.
+            shot = self._shot((0, self._previews), self._capture, Triggered(now, None), now)
+            moved, turned = self._knock(self._number + 1)
+            shot = replace(shot, preview=True, moved_mm=moved, turned_deg=turned)
+        pixels = awaited(self._pool.photograph(shot), over)
+        if pixels is None:
+            return None
+        return Frame(self._info.id, now, FrameStatus.OK, pixels, exposure_us=shot.exposure_us)
 
     def software_trigger(self) -> None:
         """Expose now, after the lag."""
@@ -278,18 +297,21 @@ class SimulatedCamera:
             exposure_us=self._settings.exposure_us,
             metadata={"pixel_format": self._settings.pixel_format or ""},
         )
-        picture = self._pool.photograph(self._shot(spec, trigger, lot, start))
+        # Within a session the number of the capture counts, because exposures are counted anew by
+        # each program: pictures of one session would share their noise, and held things a place.
+        numbers = (self._number, spec.number) if spec.number else (self._number,)
+        self._capture = spec.number or trigger.capture
+        shot = self._shot(numbers, self._capture, trigger, start)
+        picture = self._pool.photograph(replace(shot, black="black" in lot.faults))
         limits = (late, not free)
         self._coming.append(Coming(frame, picture, lot.faults, *limits))
         if "duplicate" in lot.faults:
             again = replace(frame, arrived_host_ns=arrives + _DUPLICATE_NS)
             self._coming.append(Coming(again, picture, lot.faults, *limits))
 
-    def _shot(self, spec: ArmSpec, trigger: Triggered, lot: Draw, start: int) -> Shot:
+    def _shot(self, numbers: tuple[int, ...], capture: int, trigger: Triggered, start: int) -> Shot:
         settings = self._settings
-        # Within a session the number of the capture counts, because exposures are counted anew by
-        # each program: pictures of one session would share their noise, and held things a place.
-        numbers = (self._number, spec.number) if spec.number else (self._number,)
+        moved, turned = self._knock(self._number)
         since = start if trigger.origin_ns is None else trigger.origin_ns
         board = self._simulation.scene.board
         board_ns = start - (trigger.board_zero_ns or 0)
@@ -304,15 +326,16 @@ class SimulatedCamera:
             (start - since) * 1e-9,
             board_ns * 1e-3,
             (*self._seed, *numbers),
-            "black" in lot.faults,
-            spec.number or trigger.capture,
-            **self._knock(),
+            capture=capture,
+            moved_mm=moved,
+            turned_deg=turned,
         )
 
-    def _knock(self) -> dict[str, tuple[float, float, float]]:
-        if not self._faults.knocked(self._number):
-            return {}
-        return {"moved_mm": self._faults.moved_mm, "turned_deg": self._faults.turned_deg}
+    def _knock(self, number: int) -> tuple[Triple, Triple]:
+        """How far the camera is from its place at an exposure, and how it is turned."""
+        if not self._faults.knocked(number):
+            return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+        return self._faults.moved_mm, self._faults.turned_deg
 
     def _with_meanwhile(self, arrived: list[Coming]) -> list[Coming]:
         """Wait for the pictures of frames that have arrived, and of those that came meanwhile.

@@ -18,6 +18,7 @@ from rig.simulation.imaging import sharp_image
 from rig.simulation.lighting import card_light
 from rig.simulation.mesh import TexturedMesh
 from rig.simulation.motion import knocked, placement_at
+from rig.simulation.previews import preview_camera
 from rig.simulation.raytable import RayTables
 from rig.simulation.sensor import developed
 from rig.simulation.settings import SceneSettings, SensorSettings
@@ -35,7 +36,7 @@ class Shot:
     ``board_start_us`` when, on the timing board's counter. ``seed`` makes the noise. A ``black``
     picture gets no light at all. ``capture`` counts captures: targets that are held up are
     elsewhere in each. ``moved_mm`` and ``turned_deg``: how far the camera is from its place, in
-    its own axes.
+    its own axes. A ``preview`` is a picture of large pixels, quick to make.
     """
 
     camera: str
@@ -50,6 +51,7 @@ class Shot:
     capture: int = 0
     moved_mm: Triple = (0.0, 0.0, 0.0)
     turned_deg: Triple = (0.0, 0.0, 0.0)
+    preview: bool = False
 
 
 class Studio:
@@ -165,4 +167,5 @@ class Studio:
         if shot.camera not in self.cameras:
             problem = f"there is no camera {shot.camera!r}"
             raise NotFoundError("camera", problem, "give a name of the rig")
-        return knocked(self.cameras[shot.camera], shot.moved_mm, shot.turned_deg)
+        placed = knocked(self.cameras[shot.camera], shot.moved_mm, shot.turned_deg)
+        return preview_camera(placed) if shot.preview else placed

@@ -21,6 +21,7 @@ from service.api import (
     examples,
     exports,
     health,
+    liveviews,
     metrics,
     picturesets,
     plans,
@@ -75,7 +76,7 @@ def make_app() -> FastAPI:
     resources = (
         *(root, signin, health, metrics, scans, examples, designs, exports, studies),
         *(plans, evaluations),
-        *(rigs, captures, rigtests, sessions, removed),
+        *(rigs, liveviews, captures, rigtests, sessions, removed),
         *(targetsets, picturesets, calibrations, checks, acceptances),
         *(reconstructions, comparisons),
     )

@@ -179,7 +179,7 @@ def list_sheets(service: ServiceDep, target_set_id: str, page: Page = PAGE) -> S
             media_type=sheet.media_type,
             href=at(f"{PATH}/{target_set_id}/sheets/{quote(sheet.name)}"),
         )
-        for sheet in sheets_of_file(_targets(service, target_set_id), page).values()
+        for sheet in sheets_of_file(target_file(service, target_set_id), page).values()
     ]
     return SheetList(items=items)
 
@@ -191,7 +191,7 @@ def list_sheets(service: ServiceDep, target_set_id: str, page: Page = PAGE) -> S
 )
 def read_sheet(service: ServiceDep, target_set_id: str, name: str, page: Page = PAGE) -> Response:
     """Fetch a sheet to print (PDF, SVG), or a picture of a carrier for simulations (PNG)."""
-    sheets = sheets_of_file(_targets(service, target_set_id), page)
+    sheets = sheets_of_file(target_file(service, target_set_id), page)
     if name not in sheets:
         raise NotFoundError(
             "file", f"the target set has no sheet {name!r}", f"see {PATH}/{target_set_id}/sheets"
@@ -205,6 +205,7 @@ def remove_target_set(service: ServiceDep, target_set_id: str) -> None:
     service.store.documents.remove(KIND, target_set_id)
 
 
-def _targets(service: Service, target_set_id: str) -> Path:
+def target_file(service: Service, target_set_id: str) -> Path:
+    """The target file of a set. Raises :class:`NotFoundError`."""
     documents = service.store.documents
     return documents.path(documents.get(KIND, target_set_id))

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
+
+from pydantic import Field
 
 from common.errors import RigwrightError
 from common.files.plain import plain
@@ -59,6 +61,9 @@ class CameraStatus(Model):
     armed: bool
     problem: str
     counters: dict[str, int]
+    previews: Annotated[
+        bool, Field(description="Whether it can show what it sees between captures.")
+    ] = False
 
 
 def trigger_status(
@@ -75,7 +80,8 @@ def trigger_status(
 def camera_statuses(station: Station, health: RigHealth | None) -> list[CameraStatus]:
     """Each camera of the station, in its order."""
     known = {} if health is None else health.cameras
-    return [_camera(plan, known.get(plan.name)) for plan in station.cameras]
+    able = frozenset[str]() if health is None else health.previews
+    return [_camera(plan, known.get(plan.name), plan.name in able) for plan in station.cameras]
 
 
 def rig_state(health: RigHealth | None, busy: bool, problem: RigwrightError | None) -> State:
@@ -113,7 +119,7 @@ def box_is_able(health: RigHealth) -> bool | None:
     return None if health.box is None else health.box.state in _ABLE
 
 
-def _camera(plan: CameraPlan, health: CameraHealth | None) -> CameraStatus:
+def _camera(plan: CameraPlan, health: CameraHealth | None, previews: bool) -> CameraStatus:
     health = health or CameraHealth(connected=False, problem="the rig is not open")
     return CameraStatus(
         name=plan.name,
@@ -124,4 +130,5 @@ def _camera(plan: CameraPlan, health: CameraHealth | None) -> CameraStatus:
         armed=health.armed,
         problem=health.problem,
         counters=dict(health.counters),
+        previews=previews,
     )

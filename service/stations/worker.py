@@ -13,7 +13,14 @@ from typing import Any
 
 from sqlalchemy.exc import SQLAlchemyError
 
-from common.errors import ConflictError, DeviceError, InterlockError, InternalError, RigwrightError
+from common.errors import (
+    ConflictError,
+    DeviceError,
+    InterlockError,
+    InternalError,
+    NotFoundError,
+    RigwrightError,
+)
 from common.files.plain import plain
 from common.progress import Progress, ProgressCallback
 from rig.acquisition.capture.results import RigHealth
@@ -106,6 +113,22 @@ class StationWorker:
         """What the trigger box can do; None where there is none or it is not open."""
         rig = self._rig
         return None if rig is None or rig.box is None else rig.box.capabilities
+
+    def open_rig(self, camera: str) -> Rig:
+        """The open rig, to look through one of its cameras.
+
+        Raises :class:`NotFoundError` for a camera that the station does not name.
+        """
+        if camera not in {plan.name for plan in self.station.cameras}:
+            raise NotFoundError(
+                "camera",
+                f"rig {self.name!r} has no camera {camera!r}",
+                f"choose one of {', '.join(plan.name for plan in self.station.cameras)}",
+            )
+        rig = self._rig
+        if rig is None:
+            raise self._not_open()
+        return rig
 
     def abort(self) -> None:
         """All outputs low, now; what is being done ends. Allowed always, waits for nobody."""

@@ -223,6 +223,9 @@ class CameraScript:
     """The command at which it goes for good."""
     hangs_at: int | None = None
     """The command from which nothing returns for a while."""
+    previews: bool = False
+    preview_s: float = 0.0
+    """How long it takes to show what it sees, unless told to stop."""
     empty: frozenset[int] = frozenset()
     """Shots of which the transport lost everything but the stamps."""
 
@@ -245,6 +248,8 @@ class MemoryCamera:
         self._deadline_s = 0.0
         self._lock = threading.Lock()
         self._commands = 0
+        self.configured = 0
+        self.showing = 0
 
     @property
     def info(self) -> CameraInfo:
@@ -253,10 +258,16 @@ class MemoryCamera:
     @property
     def capabilities(self) -> CameraCapabilities:
         return CameraCapabilities(
-            self.script.trigger, self.script.timestamps, True, self.script.modulus, True
+            self.script.trigger,
+            self.script.timestamps,
+            True,
+            self.script.modulus,
+            True,
+            previews=self.script.previews,
         )
 
     def configure(self, settings: CameraSettings) -> CameraSettings:
+        self.configured += 1
         if settings.exposure_us is not None:
             self.settings = replace(self.settings, exposure_us=settings.exposure_us)
         return self.settings
@@ -280,6 +291,16 @@ class MemoryCamera:
         if self.script.free_running_s:
             for k in range(200):
                 self._expose("", 0, now + round((k + 0.5) * self.script.free_running_s * 1e9))
+
+    def preview(self, over: Callable[[], bool]) -> Frame | None:
+        assert not self.armed
+        self.showing += 1
+        until = time.monotonic() + self.script.preview_s
+        while time.monotonic() < until:
+            if over():
+                return None
+            time.sleep(0.001)
+        return Frame(self._info.id, time.monotonic_ns(), FrameStatus.OK, self._picture(0))
 
     def edge(self, capture: str, shot: int, at_host_ns: int) -> None:
         """The trigger line rose."""

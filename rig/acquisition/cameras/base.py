@@ -6,10 +6,10 @@ them. Instants are nanoseconds; which clock they are of stands beside them.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,6 +85,8 @@ class CameraCapabilities:
     More than zero only where pictures are computed: the frames then state when they would have
     come, and lateness is judged by that.
     """
+    previews: bool = False
+    """Whether it can show what it sees without taking a picture: :class:`Previewing`."""
 
 
 @dataclass(frozen=True)
@@ -210,6 +212,19 @@ class CameraDevice(Protocol):
 
     def close(self) -> None:
         """Let go of it. Closing twice changes nothing."""
+        ...
+
+
+@runtime_checkable
+class Previewing(Protocol):
+    """What a :class:`CameraDevice` offers besides where its capabilities say ``previews``."""
+
+    def preview(self, over: Callable[[], bool]) -> Frame | None:
+        """What it sees now, by the thread that the camera belongs to, while it is not armed.
+
+        Triggers, counters and the pictures of captures are as if nothing had been asked. Given up
+        as soon as ``over`` is true, with None. Raises :class:`DeviceError` as other commands do.
+        """
         ...
 
 

@@ -47,7 +47,7 @@ class Inbox:
         if told.get("arm") != self._number:
             self.counts["stale_frames"] += 1
             return
-        frame = self._read(told, payload)
+        frame = self.read(told, payload)
         with self._news:
             self.counts["frames"] += 1
             if frame.status is not FrameStatus.OK:
@@ -71,7 +71,8 @@ class Inbox:
             self._seen = True
             return tuple(self._frames)
 
-    def _read(self, told: Mapping[str, Any], payload: bytes) -> Frame:
+    def read(self, told: Mapping[str, Any], payload: bytes) -> Frame:
+        """A frame as the worker tells of it."""
         status = FrameStatus(told["status"])
         notes = dict(told.get("metadata", {}))
         picture: dict[str, Any] = {"encoded": payload, "media_type": told.get("media_type")}

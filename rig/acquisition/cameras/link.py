@@ -6,9 +6,10 @@ import contextlib
 import os
 import subprocess
 import threading
+import time
 from collections import deque
 from collections.abc import Callable, Mapping
-from concurrent.futures import Future
+from concurrent.futures import Future, wait
 from concurrent.futures import TimeoutError as FutureTimeoutError
 from pathlib import Path
 from typing import Any, BinaryIO, cast
@@ -25,6 +26,8 @@ _KINDS: Mapping[str, type[RigwrightError]] = {
     kind.kind: kind for kind in (DeviceError, InputError, InternalError)
 }
 _GRACE_S = 2.0
+LOOK_S = 0.01
+"""How often whoever waits for a preview looks whether it is still wanted."""
 
 OnMessage = Callable[[wire.Header, bytes], None]
 
@@ -78,8 +81,14 @@ class WorkerLink:
         """The worker's process id."""
         return self._process.pid
 
-    def ask(self, do: str, args: Mapping[str, object], deadline_s: float) -> Any:  # noqa: ANN401
-        """The answer to one command.
+    def ask(
+        self,
+        do: str,
+        args: Mapping[str, object],
+        deadline_s: float,
+        over: Callable[[], bool] | None = None,
+    ) -> Any:  # noqa: ANN401
+        """The answer to one command. Once ``over`` is true the worker is told to give up.
 
         Raises :class:`LinkSilent` when none comes in time, :class:`LinkDown` when none will
         come, and the worker's own error when it answers with one.
@@ -93,12 +102,23 @@ class WorkerLink:
             self._answers[number] = answer
         try:
             self._write({"n": number, "do": do, "args": args})
-            return answer.result(deadline_s)
+            return answer.result(
+                deadline_s if over is None else self._watch(answer, over, deadline_s)
+            )
         except FutureTimeoutError:
             raise LinkSilent(f"no answer to '{do}' within {deadline_s:g} s") from None
         finally:
             with self._lock:
                 self._answers.pop(number, None)
+
+    def _watch(self, answer: Future[Any], over: Callable[[], bool], deadline_s: float) -> float:
+        """Wait until there is an answer or it is ``over``; how long there is still time, in s."""
+        until = time.monotonic() + deadline_s
+        while time.monotonic() < until and not wait([answer], LOOK_S).done:
+            if over():
+                self.tell("enough")
+                break
+        return max(0.0, until - time.monotonic())
 
     def tell(self, do: str) -> None:
         """Send a command whose answer nobody needs; never raises."""

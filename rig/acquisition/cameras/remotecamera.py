@@ -9,7 +9,7 @@ from __future__ import annotations
 import contextlib
 import logging
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -33,6 +33,8 @@ from rig.acquisition.cameras.workers import wire
 logger = logging.getLogger(__name__)
 
 PING_S = 1.0
+PREVIEW_S = 3.0
+"""What showing what it sees may take beyond a command: a body's mirror, a long exposure."""
 
 
 @dataclass(frozen=True)
@@ -76,6 +78,7 @@ class RemoteCamera:
         self._closed = False
         self._settings = CameraSettings()
         self._library_counts: Mapping[str, int] = {}
+        self._shown: Frame | None = None
         self._info, self._capabilities = self._start(spec.hints)
 
     @property
@@ -138,6 +141,9 @@ class RemoteCamera:
         if "frame" in header:
             self._inbox.put(header["frame"], payload)
             return
+        if "preview" in header:
+            self._shown = self._inbox.read(header["preview"], payload)
+            return
         told = header.get("failed", {})
         if told.get("detail") in ("camera-gone", "camera-error"):
             self._problem = self._problem or told["problem"]
@@ -145,12 +151,18 @@ class RemoteCamera:
             self._note = told.get("problem", "")
         self._inbox.wake()
 
-    def _ask(self, do: str, args: Mapping[str, object] | None = None) -> Any:  # noqa: ANN401
+    def _ask(
+        self,
+        do: str,
+        args: Mapping[str, object] | None = None,
+        over: Callable[[], bool] | None = None,
+    ) -> Any:  # noqa: ANN401
         link = self._link
         if self._closed or link is None:
             raise self._gone("it was closed" if self._closed else self._problem)
         try:
-            return link.ask(do, args or {}, self._spec.command_deadline_s)
+            more_s = 0.0 if over is None else PREVIEW_S
+            return link.ask(do, args or {}, self._spec.command_deadline_s + more_s, over)
         except LinkDown as error:
             self._lose(str(error))
             raise self._gone(str(error)) from None
@@ -199,6 +211,15 @@ class RemoteCamera:
             dropped = self._ask("arm", {"number": number, "shots": spec.shots})
             self._inbox.counts["stale_frames"] += int(dropped)
             self._armed = True
+
+    def preview(self, over: Callable[[], bool]) -> Frame | None:
+        """What it sees now, while it is not armed."""
+        with self._commands:
+            if self._armed or over():
+                return None
+            self._revive()
+            self._shown = None
+            return self._shown if self._ask("preview", over=over) else None
 
     def software_trigger(self) -> None:
         """Expose now."""

@@ -30,6 +30,8 @@ class CameraThread:
     def __init__(self, plan: CameraPlan, device: CameraDevice) -> None:
         self.plan = plan
         self.device = device
+        self.set_up = False
+        """Whether the camera was given the settings of its plan since it was opened."""
         self._jobs: queue.SimpleQueue[Callable[[], None] | None] = queue.SimpleQueue()
         self._thread = threading.Thread(target=self._work, name=f"camera-{plan.name}", daemon=True)
         self._thread.start()

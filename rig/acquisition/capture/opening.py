@@ -71,6 +71,10 @@ class OpenCameras:
                 threads.append(self._hands[plan.name])
         return tuple(threads)
 
+    def by_name(self) -> Mapping[str, CameraThread]:
+        """The open cameras."""
+        return dict(self._hands)
+
     def health(self) -> Mapping[str, CameraHealth]:
         """How each camera is; those that are not open say why."""
         return {

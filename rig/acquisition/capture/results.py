@@ -107,3 +107,5 @@ class RigHealth:
     box: TriggerHealth | None
     cameras: Mapping[str, CameraHealth] = field(default_factory=dict)
     busy: str | None = None
+    previews: frozenset[str] = frozenset()
+    """Names of the cameras that can show what they see between captures."""

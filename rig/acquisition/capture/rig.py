@@ -14,6 +14,7 @@ from common.progress import CancelToken, NeverCancelled, Progress, ProgressCallb
 from rig.acquisition.capture.devices import DeviceMaker
 from rig.acquisition.capture.firing import CaptureOrder, Fate
 from rig.acquisition.capture.judging import pair_and_judge
+from rig.acquisition.capture.liveview import LiveView
 from rig.acquisition.capture.opening import OpenCameras
 from rig.acquisition.capture.results import (
     CaptureResult,
@@ -24,6 +25,7 @@ from rig.acquisition.capture.results import (
     judged_lags,
 )
 from rig.acquisition.capture.rigfacts import (
+    RigDesign,
     focal_lengths_mm,
     picture_sizes,
     read_rig_design,
@@ -62,8 +64,9 @@ class Rig(Closing):
     when another process has a device, and :class:`DeviceError` when the box, or every camera,
     is not there.
 
-    :meth:`abort` and :meth:`health` are allowed always; what else is asked for meanwhile is
-    refused with :class:`ConflictError` ``rig-busy``, which says what it is busy with.
+    :meth:`abort` and :meth:`health` are allowed always; what else is asked for meanwhile, a
+    ``live`` picture too, is refused with :class:`ConflictError` ``rig-busy``, which says what it
+    is busy with.
     """
 
     def __init__(
@@ -93,6 +96,7 @@ class Rig(Closing):
             opened.callback(self._cameras.close)
             self._cameras.require_some()
             self._opened = opened.pop_all()
+        self.live = LiveView(self._cameras.by_name, lambda: self._doing)
 
     def close(self) -> None:
         """Disarm and let go of everything. Closing twice changes nothing."""
@@ -101,7 +105,13 @@ class Rig(Closing):
     def health(self) -> RigHealth:
         """How everything is; asks nothing of the devices and never waits."""
         box = None if self.box is None else self.box.health()
-        return RigHealth(box, self._cameras.health(), self._doing)
+        able = frozenset(c.name for c in self.station.cameras if self.live.able(c.name))
+        return RigHealth(box, self._cameras.health(), self._doing, able)
+
+    @property
+    def design(self) -> RigDesign:
+        """How it was designed, empty where that is not known."""
+        return self._design
 
     def abort(self) -> None:
         """All outputs low, now, and an end to what is being done; always allowed."""

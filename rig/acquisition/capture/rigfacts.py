@@ -7,8 +7,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
+
 from common.errors import ConflictError, InputError
 from common.files.plain import plain
+from geometry.arrays import Floats
 from geometry.camera import RigCamera
 from rig.acquisition.cameras.base import CameraInfo
 from rig.acquisition.session import paths
@@ -19,6 +22,7 @@ from rig.acquisition.session.records import SessionFile
 from rig.acquisition.session.storage import sha256
 from rig.acquisition.station.spec import Station
 from rig.design.designfile import placed_camera, read_design
+from rig.design.layoutfile import read_datum
 
 RIG_SCHEMA = "rigwright.session-rig/1"
 CALIBRATION_SCHEMA = "rigwright.session-calibration/1"
@@ -30,6 +34,8 @@ class RigDesign:
 
     cameras: Mapping[str, RigCamera] = field(default_factory=dict)
     data: bytes = b""
+    datum_rig_mm: Floats = field(default_factory=lambda: np.zeros(3))
+    """That of the layout beside the design; else the origin of the rig's frame, (3,)."""
 
 
 def read_rig_design(station: Station) -> RigDesign:
@@ -49,7 +55,9 @@ def read_rig_design(station: Station) -> RigDesign:
             f"call it as the design does: {', '.join(cameras)}",
         )
     named = {camera.name: cameras[camera.name] for camera in station.cameras}
-    return RigDesign(named, Path(station.design).read_bytes())
+    path = Path(station.design)
+    datum = read_datum(path.with_name("layout.json"))
+    return RigDesign(named, path.read_bytes(), np.zeros(3) if datum is None else datum)
 
 
 def picture_sizes(station: Station, design: RigDesign) -> dict[str, tuple[int, int]]:

@@ -4,6 +4,7 @@ import { every, get, post } from "./api.js";
 import { fill, h, number, problem, table } from "./dom.js";
 import { capturing } from "./capture.js";
 import { watch } from "./job.js";
+import { live } from "./live.js";
 
 const TESTS = [
   ["self-test", "Self-test", "Looks at box, clock, interlock, cameras and disk. Fires nothing."],
@@ -38,6 +39,7 @@ function panel(one, signal) {
   const tested = h("div", { "aria-live": "polite" });
   const told = h("div", { "aria-live": "polite" });
   const capture = capturing(one, signal);
+  const sights = live(one, signal);
   const act = async (path) => {
     try {
       await post(path);
@@ -55,11 +57,13 @@ function panel(one, signal) {
         h("div", { class: "row hardware" }, TESTS.map(([test, words, title]) =>
           h("button", { type: "button", class: "quiet", title, onclick: () => run(one, test, tested, signal) }, words)),
         h("button", { type: "button", class: "quiet", title: "Let the box leave its fault. Fires nothing.", onclick: () => act(one.links.reset) }, "Reset the box")),
-        tested)));
+        tested)),
+    sights.element);
   let before = "";
   const show = (now) => {
     if (!now) return;
     capture.know(now);
+    sights.know(now);
     const said = JSON.stringify([now.status, now.problem, now.trigger?.state, now.trigger?.interlock_closed, now.trigger?.last_problem, now.cameras.map((c) => [c.connected, c.armed, c.problem])]);
     if (said === before) return; // what has not changed is not drawn anew under the reader's hand
     before = said;

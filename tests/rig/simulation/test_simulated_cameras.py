@@ -22,6 +22,7 @@ from rig.simulation.backend import SimulatedBackend
 from rig.simulation.faults import CameraFaults
 from rig.simulation.flatsettings import BoardSettings, PlaceSettings, TargetSettings
 from rig.simulation.motion import knocked, rotation_by
+from rig.simulation.previews import preview_camera
 from rig.simulation.settings import LightSettings, SceneSettings, SensorSettings, SimulationSettings
 
 REPO = Path(__file__).resolve().parents[3]
@@ -521,3 +522,33 @@ def alive(process: int) -> bool:
     status = Path(f"/proc/{process}/stat")
     # A zombie has ended; that nobody asks how is the test machine's affair.
     return status.exists() and status.read_text().rpartition(")")[2].split()[0] != "Z"
+
+
+def test_a_look_is_quick_to_make_and_changes_no_capture(backend_of: Maker) -> None:
+    scene = replace(
+        EMPTY, targets=(TargetSettings("aruco", PlaceSettings((0.0, -40.0, 0.0)), 80.0),)
+    )
+    pixels = []
+    for looks in (0, 2):
+        backend = backend_of(scene=scene)
+        device = backend.open("cam02")
+        for _ in range(looks):
+            seen = device.preview(lambda: False)
+            assert seen is not None and seen.pixels is not None and seen.pixels.max() > 100
+        assert device.preview(lambda: True) is None
+        assert device.health().counters["exposures"] == 0
+        _, frames = capture(backend)
+        pixels.append(frames["cam02"][0].pixels)
+        assert frames["cam02"][0].counter == BASE.counter_start + 1
+    np.testing.assert_array_equal(pixels[0], pixels[1])
+
+
+def test_a_look_has_few_pixels_of_the_same_view() -> None:
+    camera = placed(lens(2000, distortion=(-0.1, 0.0, 0.0, 0.0, 0.0)))
+    small = preview_camera(camera)
+    assert small.camera.image_size_px == (500, 375)
+    points = np.array([[30.0, -60.0, 20.0], [-70.0, 10.0, -60.0]])
+    whole, _ = camera.camera.project(camera.pose, points)
+    found, _ = small.camera.project(small.pose, points)
+    np.testing.assert_allclose((found + 0.5) * 4 - 0.5, whole, atol=1e-9)
+    assert preview_camera(RIG[0]).camera.image_size_px == RIG[0].camera.image_size_px

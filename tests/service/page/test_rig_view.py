@@ -61,6 +61,29 @@ def test_a_capture_is_seen_by_everybody_at_the_rig(
     other.sound()
 
 
+@pytest.mark.slow
+def test_a_camera_is_aimed_on_the_screen_and_a_capture_goes_first(
+    visits: tuple[Visit, Visit], address: str
+) -> None:
+    one, _ = visits
+    one.page.get_by_text("Live view", exact=True).click()
+    one.see("The datum should be at the cross.")
+    first = one.page.locator(".live figure").first
+    first.locator(".sight").click(position={"x": 20, "y": 40})
+    one.see("degrees to the left")
+    assert first.locator("svg .cross").count() == 2 and first.locator("svg .found").count() == 1
+    one.sound()
+    before = len(read(f"{address}v1/captures")["items"])  # type: ignore[index]
+    one.press("Fire")
+    one.page.locator(".result .state", has_text="complete").first.wait_for()
+    assert len(read(f"{address}v1/captures")["items"]) == before + 1  # type: ignore[index]
+    shown = first.locator("img").get_attribute("src")
+    one.page.wait_for_function(
+        "was => document.querySelector('.live img').getAttribute('src') !== was", arg=shown
+    )  # it goes on
+    one.page.get_by_text("Live view", exact=True).click()
+
+
 def test_a_countdown_can_be_stopped(visits: tuple[Visit, Visit], address: str) -> None:
     one, _ = visits
     before = len(read(f"{address}v1/captures")["items"])  # type: ignore[index]

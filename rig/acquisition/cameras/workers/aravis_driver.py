@@ -5,14 +5,14 @@ from __future__ import annotations
 import contextlib
 import ipaddress
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Optional
 
 import gi
 
 from rig.acquisition.cameras.workers import features
 from rig.acquisition.cameras.workers.aravis_nodes import AravisNodes, gone, library, pfnc
-from rig.acquisition.cameras.workers.serve import Picture
+from rig.acquisition.cameras.workers.serve import POLL_S, Picture
 
 gi.require_version("Aravis", "0.8")
 from gi.repository import Aravis, GLib  # noqa: E402
@@ -22,6 +22,7 @@ GVSP_IDS = 65535
 CONTROL_REGISTER, CONTROL_BITS = 0x0A00, 0x3
 """Who controls a GigE Vision camera: exclusive access and control access."""
 KEPT_BUFFERS = 16
+PREVIEW_BUFFERS = 3
 COUNTERS = (
     "n_completed_buffers",
     "n_failures",
@@ -140,6 +141,7 @@ class AravisDriver:
             "frame_counter_skips_zero": short,
             "exposure_start_delay_us": features.exposure_delay_us(self._nodes),
             "settable": features.settable(self._nodes),
+            "previews": True,
         }
 
     def _on_lost(self, *_: object) -> None:
@@ -156,17 +158,20 @@ class AravisDriver:
         self._check_control()
         with library():
             dropped = self._stop()
-            self._stream = self._camera.create_stream(None, None)
-            if self._stream is None:
-                raise gone("its stream cannot be opened")
-            self._exposure_us = features.read_settings(self._nodes)["exposure_us"]
-            payload = self._camera.get_payload()
-            for _ in range(min(shots + 4, KEPT_BUFFERS)):
-                self._stream.push_buffer(Aravis.Buffer.new_allocate(payload))
-            self._camera.start_acquisition()
-            self._running = True
+            self._begin(min(shots + 4, KEPT_BUFFERS))
         self._fired.clear()
         return dropped
+
+    def _begin(self, buffers: int) -> None:
+        self._stream = self._camera.create_stream(None, None)
+        if self._stream is None:
+            raise gone("its stream cannot be opened")
+        self._exposure_us = features.read_settings(self._nodes)["exposure_us"]
+        payload = self._camera.get_payload()
+        for _ in range(buffers):
+            self._stream.push_buffer(Aravis.Buffer.new_allocate(payload))
+        self._camera.start_acquisition()
+        self._running = True
 
     def _check_control(self) -> None:
         """A camera that was without power answers again, but has forgotten us and its settings."""
@@ -236,6 +241,25 @@ class AravisDriver:
         except (GLib.Error, TypeError, ValueError):
             # A frame whose first packet is missing says neither its size nor its format.
             return header, b""
+
+    def preview(self, over: Callable[[], bool]) -> Optional[Picture]:  # noqa: UP045
+        """The first frame of a camera that runs freely for a moment."""
+        self._check_control()
+        with library():
+            self._stop()
+            with features.untriggered(self._nodes):
+                self._begin(PREVIEW_BUFFERS)
+                try:
+                    while not over():
+                        pictures = self.poll(POLL_S)
+                        if pictures and pictures[0][1]:
+                            return pictures[0]
+                finally:
+                    self._stop()
+        return None
+
+    def rest(self) -> None:
+        """It stands still already."""
 
     def disarm(self) -> None:
         """Take no more triggers."""

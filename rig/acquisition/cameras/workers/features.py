@@ -5,8 +5,9 @@ Names are those of the SFNC of the EMVA and, after them, the older ones cameras 
 
 from __future__ import annotations
 
+import contextlib
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Optional, Protocol, Union
 
 from common.errors import InputError
@@ -153,6 +154,20 @@ def set_trigger(nodes: Nodes, kind: str, line: str) -> str:
         nodes.set("TriggerActivation", "RisingEdge")
     nodes.set("TriggerMode", "On")
     return kind
+
+
+@contextlib.contextmanager
+def untriggered(nodes: Nodes) -> Iterator[None]:
+    """Inside, the camera exposes by itself; afterwards it waits for its trigger as before."""
+    before = nodes.get("TriggerMode") if nodes.has("TriggerMode") else "Off"
+    if before == "Off":
+        yield
+        return
+    nodes.set("TriggerMode", "Off")
+    try:
+        yield
+    finally:
+        nodes.set("TriggerMode", str(before))
 
 
 def set_rate(nodes: Nodes, rate_hz: Optional[float]) -> None:  # noqa: UP045

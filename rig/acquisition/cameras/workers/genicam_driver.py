@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 from genicam import genapi, gentl
@@ -12,10 +12,11 @@ from harvesters.core import Harvester
 
 from common.errors import DeviceError
 from rig.acquisition.cameras.workers import features
-from rig.acquisition.cameras.workers.serve import Picture
+from rig.acquisition.cameras.workers.serve import POLL_S, Picture
 
 GVSP_IDS = 65535
 KEPT_BUFFERS = 16
+PREVIEW_BUFFERS = 3
 USABLE = (genapi.EAccessMode.RO, genapi.EAccessMode.RW, genapi.EAccessMode.WO)
 
 
@@ -175,6 +176,7 @@ class GenicamDriver:
             "frame_counter_skips_zero": short,
             "exposure_start_delay_us": features.exposure_delay_us(self._nodes),
             "settable": features.settable(self._nodes),
+            "previews": True,
         }
 
     def configure(self, settings: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -241,6 +243,28 @@ class GenicamDriver:
             pixel_format=str(part.data_format), width=int(part.width), height=int(part.height)
         )
         return header, part.data.tobytes()
+
+    def preview(self, over: Callable[[], bool]) -> Picture | None:
+        """The first frame of a camera that runs freely for a moment."""
+        with _library():
+            self._stop()
+            with features.untriggered(self._nodes):
+                self._acquirer.num_buffers = max(PREVIEW_BUFFERS, self._acquirer.min_num_buffers)
+                self._acquirer.start()
+                try:
+                    return self._first(over)
+                finally:
+                    self._stop()
+
+    def _first(self, over: Callable[[], bool]) -> Picture | None:
+        while not over():
+            pictures = self.poll(POLL_S)
+            if pictures and pictures[0][1]:
+                return pictures[0]
+        return None
+
+    def rest(self) -> None:
+        """It stands still already."""
 
     def disarm(self) -> None:
         """Take no more triggers."""

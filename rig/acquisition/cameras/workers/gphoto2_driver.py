@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import PurePosixPath
 from typing import Any
 
@@ -143,6 +143,9 @@ class GphotoDriver:
             "timestamps": "none",
             "frame_counter": False,
             "settable": [field for field in WIDGETS if self._widget(field) is not None],
+            "previews": bool(
+                self._camera.get_abilities().operations & gp.GP_OPERATION_CAPTURE_PREVIEW
+            ),
         }
 
     def _widget(self, field: str) -> Any:  # noqa: ANN401
@@ -268,6 +271,27 @@ class GphotoDriver:
             "metadata": {"file": name},
         }
         return ((header, bytes(file.get_data_and_size())),)
+
+    def preview(self, over: Callable[[], bool]) -> Picture | None:
+        """What the body's screen would show."""
+        if over():
+            return None
+        with _library():
+            file = self._camera.capture_preview()
+            header = {
+                "arrived_host_ns": time.monotonic_ns(),
+                "status": "ok",
+                "media_type": file.get_mime_type(),
+            }
+            return header, bytes(file.get_data_and_size())
+
+    def rest(self) -> None:
+        """Let the mirror down: with it up most bodies take no release at their socket."""
+        with contextlib.suppress(gp.GPhoto2Error):
+            widget = self._camera.get_single_config("viewfinder")
+            if widget.get_value():
+                widget.set_value(0)
+                self._camera.set_single_config("viewfinder", widget)
 
     def disarm(self) -> None:
         """Ask for no more files."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import threading
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -80,6 +80,8 @@ class OpencvDriver:
             "timestamps": "host",
             "frame_counter": False,
             "settable": ["exposure_us"] if exposes else [],
+            # A sequence of files would be used up by looking.
+            "previews": self._live,
         }
 
     def configure(self, settings: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -189,6 +191,16 @@ class OpencvDriver:
         # The noise of a sensor makes no two pictures alike; only a covered lens has none.
         if self._last == last and image.max() > DARK:
             raise _gone("it gives the same picture again and again")
+
+    def preview(self, over: Callable[[], bool]) -> Picture | None:
+        """The newest frame."""
+        if over():
+            return None
+        self._flush(1)
+        return self._retrieve(time.monotonic_ns())
+
+    def rest(self) -> None:
+        """It runs all the time."""
 
     def disarm(self) -> None:
         """Want no more frames."""

@@ -14,7 +14,7 @@ import queue
 import sys
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any, BinaryIO, Protocol
+from typing import Any, BinaryIO, Optional, Protocol, runtime_checkable
 
 from common.errors import DeviceError, InternalError, RigwrightError
 from rig.acquisition.cameras.workers import wire
@@ -23,6 +23,9 @@ POLL_S = 0.05
 """How long one look for frames may take: what arming waits for it at most."""
 LAST_GRACE_S = 3.0
 """Time to let go of the camera after the host went; a library that hangs is left behind."""
+
+REST_S = 4.0
+"""A camera that has shown what it sees, and is asked for nothing for so long, goes back to rest."""
 
 BESIDE = ("ping", "collect")
 """Commands that never wait for the fetching."""
@@ -81,6 +84,19 @@ class Driver(Protocol):
         ...
 
 
+@runtime_checkable
+class PreviewDriver(Driver, Protocol):
+    """A driver whose camera can show what it sees."""
+
+    def preview(self, over: Callable[[], bool]) -> Optional[Picture]:  # noqa: UP045
+        """What it sees now, while it is not armed; None when given up because ``over`` is true."""
+        ...
+
+    def rest(self) -> None:
+        """Whoever looked has gone, or arming is next: as if nobody had looked."""
+        ...
+
+
 class Worker:
     """Serves one driver to the host at the other end of two streams."""
 
@@ -100,13 +116,14 @@ class Worker:
         self._fetching = threading.Event()
         self._arm_number = 0
         self._armed = False
+        self._shows = False
         self._over = False
 
     def run(self, source: BinaryIO) -> None:
         """Serve until the host says ``close`` or is gone."""
         threading.Thread(target=self._listen, args=(source,), daemon=True).start()
         threading.Thread(target=self._fetch, daemon=True).start()
-        while (command := self._commands.get()) is not None:
+        while (command := self._next()) is not None:
             self._answer(command)
             if command.get("do") == "close":
                 break
@@ -115,6 +132,21 @@ class Worker:
         with self._writing:
             # A picture may be on its way still, and who listened has hung up.
             self._over = True
+
+    def _next(self) -> Optional[wire.Header]:  # noqa: UP045
+        while True:
+            try:
+                return self._commands.get(timeout=REST_S if self._shows else None)
+            except queue.Empty:
+                self._rest()
+
+    def _rest(self) -> None:
+        driver, shows = self._driver, self._shows
+        self._shows = False
+        if shows and isinstance(driver, PreviewDriver):
+            # What it says of a body that does not go back to rest, the next command hears too.
+            with contextlib.suppress(RigwrightError):
+                driver.rest()
 
     def _listen(self, source: BinaryIO) -> None:
         with contextlib.suppress(wire.WireError, OSError):
@@ -161,6 +193,8 @@ class Worker:
 
     def _drive(self, driver: Driver, do: str, args: Mapping[str, Any]) -> object:
         beside = ("ping", "collect", "trigger", "clock") if driver.shares_library else BESIDE
+        if do == "enough":
+            return None  # that it came has ended a preview
         if do in beside:
             return self._step(driver, do, args)
         with self._alone():
@@ -169,15 +203,28 @@ class Worker:
     def _step(self, driver: Driver, do: str, args: Mapping[str, Any]) -> object:
         if do in ("arm", "disarm", "configure"):
             return self._change(driver, do, args)
+        if do == "preview":
+            return self._preview(driver)
         if do == "clock":
             return driver.clock(int(args["count"]))
         if do not in ("trigger", "collect", "ping"):
             raise InternalError("worker", f"unknown command '{do}'", "report this")
         return getattr(driver, do)()
 
+    def _preview(self, driver: Driver) -> bool:
+        """Send what the camera sees; whether there was time for it."""
+        if self._armed or not isinstance(driver, PreviewDriver):
+            raise InternalError("worker", "'preview' of a camera that is armed", "report this")
+        self._shows = True
+        picture = driver.preview(lambda: not self._commands.empty())
+        if picture is not None:
+            self._say({"preview": picture[0]}, picture[1])
+        return picture is not None
+
     def _change(self, driver: Driver, do: str, args: Mapping[str, Any]) -> object:
         # Not armed while it changes: what fails half-way must not be fetched from.
         was_armed, self._armed = self._armed, False
+        self._rest()
         if do == "arm":
             dropped = driver.arm(int(args["shots"]))
             self._arm_number, self._armed = int(args["number"]), True

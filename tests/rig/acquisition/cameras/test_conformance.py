@@ -14,6 +14,7 @@ from rig.acquisition.cameras.base import (
     CameraDevice,
     CameraSettings,
     FrameStatus,
+    Previewing,
     TimestampKind,
     TriggerKind,
 )
@@ -94,6 +95,30 @@ def test_what_the_capabilities_promise_is_in_the_frames(
         assert (frame.device_ns is not None) == stamped
     if can.frame_counter:
         assert len({frame.counter for frame in frames}) == len(frames)
+
+
+def test_a_look_between_captures_changes_nothing(
+    camera_rig: CameraRig, device: CameraDevice
+) -> None:
+    device.disarm()
+    of_files = device.info.backend == "folder" or device.info.model == "CV_IMAGES"
+    assert device.capabilities.previews == (not of_files)
+    if not device.capabilities.previews:
+        return
+    assert isinstance(device, Previewing)
+    before = dict(device.health().counters)
+    if device.info.backend == "gphoto2":  # its virtual body promises what it has not
+        with pytest.raises(DeviceError, match="Unsupported"):
+            device.preview(lambda: False)
+    else:
+        seen = device.preview(lambda: False)
+        assert seen is not None and seen.has_picture
+        assert seen.status is FrameStatus.OK
+    assert device.preview(lambda: True) is None
+    frames = shoot(camera_rig, device, 2)
+    assert len(frames) >= 2 if free_running(device) else len(frames) == 2
+    after = device.health().counters
+    assert after.get("stale_frames", 0) == before.get("stale_frames", 0)
 
 
 def test_frames_from_before_arming_are_dropped_and_counted(

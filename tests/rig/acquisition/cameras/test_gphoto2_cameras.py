@@ -124,3 +124,45 @@ def hang_and_go_on(camera: RemoteCamera) -> None:
     camera.software_trigger()
     assert len(camera.wait_frames(1, 2.0)) == 1
     assert camera.configure(CameraSettings()).f_number == 8.0
+
+
+def test_a_look_leaves_the_mirror_down() -> None:
+    from rig.acquisition.cameras.workers.gphoto2_driver import GphotoDriver
+
+    class File:
+        def get_mime_type(self) -> str:
+            return "image/jpeg"
+
+        def get_data_and_size(self) -> bytes:
+            return b"seen"
+
+    class Mirror:
+        up = 0
+
+        def get_value(self) -> int:
+            return self.up
+
+        def set_value(self, value: int) -> None:
+            self.up = value
+
+    class Body:
+        mirror = Mirror()
+
+        def capture_preview(self) -> File:
+            self.mirror.up = 1
+            return File()
+
+        def get_single_config(self, name: str) -> Mirror:
+            assert name == "viewfinder"
+            return self.mirror
+
+        def set_single_config(self, name: str, widget: Mirror) -> None:
+            assert (name, widget) == ("viewfinder", self.mirror)
+
+    driver = GphotoDriver({"virtual_folder": None})
+    driver._camera = body = Body()
+    assert driver.preview(lambda: True) is None and body.mirror.up == 0
+    seen = driver.preview(lambda: False)
+    assert seen is not None and seen[1] == b"seen" and body.mirror.up == 1
+    driver.rest()
+    assert body.mirror.up == 0

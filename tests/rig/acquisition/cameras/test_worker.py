@@ -9,7 +9,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +33,8 @@ class SlowDriver:
         self.options = options
         self.fail: Exception | None = None
         self.fetch_s = 0.0
+        self.shows_nothing = False
+        self.rested = 0
 
     def open(self, camera_id: str) -> Mapping[str, Any]:
         return {"info": {"id": camera_id}}
@@ -65,6 +67,14 @@ class SlowDriver:
     def ping(self) -> Mapping[str, int]:
         raise ZeroDivisionError("as libraries do")
 
+    def preview(self, over: Callable[[], bool]) -> serve.Picture | None:
+        while self.shows_nothing and not over():
+            time.sleep(0.001)
+        return None if self.shows_nothing else ({"counter": 9}, b"seen")
+
+    def rest(self) -> None:
+        self.rested += 1
+
     def close(self) -> None:
         """Nothing is held."""
 
@@ -94,13 +104,21 @@ class Host:
                 return message[0]
             self._keep(*message)
 
+    def hear_answer(self, number: int) -> None:
+        while (message := wire.receive(self.answers)) is not None:
+            if message[0].get("re") == number:
+                return
+        raise AssertionError("the worker ended")
+
     def hear(self) -> None:
         message = wire.receive(self.answers)
         assert message is not None
         self._keep(*message)
 
     def _keep(self, header: wire.Header, payload: bytes) -> None:
-        if "frame" in header:
+        if "preview" in header:
+            self.frames.append((header["preview"], payload))
+        elif "frame" in header:
             self.frames.append((header["frame"], payload))
         else:
             self.failed.append(header["failed"])
@@ -172,6 +190,29 @@ def test_a_sign_of_life_does_not_wait_for_a_download(host: Host) -> None:
     began = time.monotonic()
     host.ask("trigger")  # this library cannot do both
     assert time.monotonic() - began > 0.1
+
+
+def test_a_look_gives_way_to_whatever_is_asked_next(host: Host) -> None:
+    host.driver.shows_nothing = True
+    wire.send(host.commands, {"n": 1, "do": "preview", "args": {}})
+    told = host.ask("arm", number=1, shots=1)  # the answer to the look comes first
+    assert (told["re"], told["ok"]) == (1, False)
+    host.hear_answer(7)
+    assert host.driver.rested == 1
+    assert host.ask("preview")["error"]["kind"] == "internal"  # it is armed
+
+
+def test_a_camera_nobody_looks_through_goes_back_to_rest(
+    host: Host, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(serve, "REST_S", 0.05)
+    assert host.ask("preview")["ok"] is True
+    assert host.frames == [({"counter": 9}, b"seen")]
+    until = time.monotonic() + 5.0
+    while not host.driver.rested and time.monotonic() < until:
+        time.sleep(0.005)
+    time.sleep(0.15)
+    assert host.driver.rested == 1
 
 
 def test_errors_cross_as_they_are(host: Host) -> None:
