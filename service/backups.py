@@ -24,6 +24,7 @@ from common.errors import ConflictError, InputError, RigwrightError
 from common.files.strict import StrictModel, parsed
 from common.version import program_version
 from service.keys import audit, keyfile
+from service.stations import removed
 from service.stations.filed import filed_at_once
 from service.stations.registry import STATION_KINDS
 from service.store import DATABASE_NAME, Store
@@ -34,11 +35,15 @@ _ABOUT = "backup.json"
 _TRIES = 3
 _CHUNK_BYTES = 1 << 20
 _BLOB = re.compile(r"blobs/sha256/([0-9a-f]{2})/([0-9a-f]{2})/(\1\2[0-9a-f]{60})")
+_NAME = r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}"
 _NAMES = (
     _BLOB,
     re.compile(rf"{re.escape(DATABASE_NAME)}|{re.escape(keyfile.FILE_NAME)}|{_ABOUT}"),
     re.compile(rf"{re.escape(audit.FILE_NAME)}(\.\d)?"),
-    re.compile(r"sessions/[A-Za-z0-9][A-Za-z0-9_.-]{0,63}(/(?!\.{1,2}(/|$))[^/\\\0]+)+"),
+    re.compile(
+        rf"sessions/({re.escape(removed.FOLDER)}/{_NAME}~\d{{8}}T\d{{12}}Z|{_NAME})"
+        r"(/(?!\.{1,2}(/|$))[^/\\\0]+)+"
+    ),
 )
 """All that may be in a backup: nothing else is written anywhere."""
 
@@ -53,12 +58,16 @@ class About(StrictModel):
 
 @dataclass(frozen=True)
 class Backup:
-    """What was put into a backup, or taken out of it. ``damaged``: sessions that are not whole."""
+    """What was put into a backup, or taken out of it. ``damaged``: sessions that are not whole.
+
+    ``removed``: sessions besides that were deleted and can still be brought back.
+    """
 
     blobs: int
     sessions: int
     size_bytes: int
     damaged: tuple[str, ...] = ()
+    removed: int = 0
 
 
 def back_up(data: Path, sessions: Path, out: Path) -> Backup:
@@ -113,8 +122,8 @@ def _written(data: Path, sessions: Path, part: Path) -> Backup:
         for path in [data / keyfile.FILE_NAME, *sorted(data.glob(f"{audit.FILE_NAME}*"))]:
             if path.is_file():
                 archive.write(path, path.name, zipfile.ZIP_DEFLATED)
-        folders = _sessions(sessions)
-        for folder in folders:
+        folders, away = _sessions(sessions), _sessions(sessions / removed.FOLDER)
+        for folder in [*folders, *away]:
             try:
                 files = filed_at_once(folder)
             except RigwrightError:
@@ -122,7 +131,7 @@ def _written(data: Path, sessions: Path, part: Path) -> Backup:
                 damaged.append(folder.name)
                 files = [(_relative(p, folder), p) for p in folder.rglob("*") if p.is_file()]
             for inner, content in files:
-                name = f"sessions/{folder.name}/{inner}"
+                name = f"sessions/{_relative(folder, sessions)}/{inner}"
                 if isinstance(content, bytes):
                     archive.writestr(name, content)
                 else:
@@ -130,7 +139,7 @@ def _written(data: Path, sessions: Path, part: Path) -> Backup:
     # Renamed first and written later, a backup would be empty after a loss of power.
     with part.open("rb") as written:
         os.fsync(written.fileno())
-    return Backup(len(hashes), len(folders), part.stat().st_size, tuple(damaged))
+    return Backup(len(hashes), len(folders), part.stat().st_size, tuple(damaged), len(away))
 
 
 def _relative(path: Path, folder: Path) -> str:
@@ -173,7 +182,8 @@ def restore(backup: Path, data: Path) -> Backup:
         if missing:
             raise _unsound(backup, f"lacks {len(missing)} of its files")
         size = sum(archive.getinfo(name).file_size for name in names)
-        return Backup(len(known), len(_sessions(data / "sessions")), size)
+        found, away = (_sessions(data / "sessions" / inner) for inner in ("", removed.FOLDER))
+        return Backup(len(known), len(found), size, removed=len(away))
 
 
 @contextmanager

@@ -59,6 +59,7 @@ def test_a_capture_is_taken_by_the_service_and_told_alike(
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_the_service_may_be_named(lab: tuple[Path, Path, str, FakeTrigger]) -> None:
     _, _, url, _ = lab
     done = rigwright_here("capture", "--server", f"{url}/", "--subject", "Åsa", "--count", "2")
@@ -70,6 +71,7 @@ def test_the_service_may_be_named(lab: tuple[Path, Path, str, FakeTrigger]) -> N
     assert json.loads(dry.stdout) == {"ready": ["cam01", "cam02"], "faults": []}
 
 
+@pytest.mark.slow
 def test_a_check_writes_the_delays_there_and_says_the_same_as_here(
     tmp_path: Path, lab: tuple[Path, Path, str, FakeTrigger]
 ) -> None:
@@ -90,6 +92,7 @@ def test_a_check_writes_the_delays_there_and_says_the_same_as_here(
     assert read_station(station).camera("cam01").delay_us == pytest.approx(3000.0, abs=100.0)
 
 
+@pytest.mark.slow
 def test_status_box_and_abort(lab: tuple[Path, Path, str, FakeTrigger]) -> None:
     _, station, _, box = lab
     told = rigwright_here("rig", "status", "--station", station)
@@ -112,6 +115,7 @@ def test_status_box_and_abort(lab: tuple[Path, Path, str, FakeTrigger]) -> None:
     wait_for(lambda: rigwright_here("rig", "status", "--station", station).returncode == 0)
 
 
+@pytest.mark.slow
 def test_ctrl_c_ends_the_capture_there(lab: tuple[Path, Path, str, FakeTrigger]) -> None:
     data, station, _, box = lab
     before = pulses(box)
@@ -131,6 +135,7 @@ def test_ctrl_c_ends_the_capture_there(lab: tuple[Path, Path, str, FakeTrigger])
     assert filed["captures"] == []
 
 
+@pytest.mark.slow
 def test_what_is_not_whole_is_told_and_ends_with_its_code(tmp_path: Path) -> None:
     more = "\n[simulation.faults.cam02]\ndrop = 1.0\n"
     station = write_station(tmp_path / "in", name="poor", more=more)
@@ -142,6 +147,7 @@ def test_what_is_not_whole_is_told_and_ends_with_its_code(tmp_path: Path) -> Non
     assert "is not complete" in done.stderr.splitlines()[-1]
 
 
+@pytest.mark.slow
 def test_a_service_that_asks_for_keys(tmp_path: Path) -> None:
     station = write_station(tmp_path / "in")
     (tmp_path / "data").mkdir()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sqlite3
 import zipfile
+from datetime import timedelta
 from pathlib import Path
 
 import pytest
@@ -20,6 +21,7 @@ from rig.devices.station import open_station
 from service.backups import back_up, restore
 from service.keys.keyfile import add_key, read_keys
 from service.keys.scope import Scope
+from service.stations.removed import RemovedSessions
 from service.store import DATABASE_NAME, Store
 from service.store.jobrecords import NewJob
 from service.store.scans import scan_identity
@@ -91,6 +93,24 @@ def test_sessions_come_along_whole_or_as_they_are(tmp_path: Path) -> None:
     assert (tmp_path / "new" / "sessions" / "bert" / "session.json").read_text() == "broken"
 
 
+def test_a_deleted_session_can_be_brought_back_from_a_backup(tmp_path: Path) -> None:
+    data = tmp_path / "data"
+    filled(data).close()
+    for name in ("anna", "bert"):
+        (data / "sessions" / name / "images").mkdir(parents=True)
+        (data / "sessions" / name / "session.json").write_text("not read here")
+        (data / "sessions" / name / "images" / "1.jpg").write_bytes(b"anna")
+    away = RemovedSessions(data / "sessions", timedelta(days=7)).remove(data / "sessions" / "anna")
+    made = back_up(data, data / "sessions", tmp_path / "b.zip")
+    assert (made.sessions, made.removed) == (1, 1)
+    done = rigwright_here("restore", "b.zip", "--data", "new", cwd=tmp_path)
+    assert "1 sessions and 1 deleted ones that can be restored" in done.stdout
+    back = RemovedSessions(tmp_path / "new" / "sessions", timedelta(days=7))
+    assert [one.id for one in back.all()] == [away.id]
+    assert back.restore(away.id) == "anna"
+    assert (tmp_path / "new" / "sessions" / "anna" / "images" / "1.jpg").read_bytes() == b"anna"
+
+
 def test_nothing_is_replaced(tmp_path: Path, backup: Path) -> None:
     with pytest.raises(ConflictError, match="there already"):
         back_up(tmp_path / "data", tmp_path / "data" / "sessions", backup)
@@ -100,7 +120,9 @@ def test_nothing_is_replaced(tmp_path: Path, backup: Path) -> None:
         back_up(tmp_path, tmp_path, tmp_path / "other.zip")
 
 
-@pytest.mark.parametrize("fault", ["cut", "content", "blob", "stranger", "outside", "no zip"])
+@pytest.mark.parametrize(
+    "fault", ["cut", "content", "blob", "stranger", "outside", "hidden", "no zip"]
+)
 def test_an_unsound_backup_leaves_nothing(tmp_path: Path, backup: Path, fault: str) -> None:
     bad = tmp_path / "bad.zip"
     if fault in ("cut", "content", "no zip"):
@@ -114,8 +136,13 @@ def test_an_unsound_backup_leaves_nothing(tmp_path: Path, backup: Path, fault: s
                 if fault == "blob" and name.startswith("blobs/"):
                     continue
                 new.writestr(name, old.read(name))
-            if fault in ("stranger", "outside"):
-                new.writestr({"stranger": "setup.py", "outside": "sessions/a/../../x"}[fault], "x")
+            strange = {
+                "stranger": "setup.py",
+                "outside": "sessions/a/../../x",
+                "hidden": "sessions/.removed/anna/x",
+            }
+            if fault in strange:
+                new.writestr(strange[fault], "x")
     before = files_under(tmp_path)
     with pytest.raises(InputError):
         restore(bad, tmp_path / "new")

@@ -33,7 +33,7 @@ def backup(
         settings = read_settings(data_dir=data)
         made = back_up(settings.data_dir, settings.sessions_folder, out)
         sys.stdout.write(
-            f"{out}: {made.blobs} files and {made.sessions} sessions, "
+            f"{out}: {made.blobs} files and {made.sessions} sessions{_away(made.removed)}, "
             f"{made.size_bytes / 1e6:.1f} MB\n"
         )
         for name in made.damaged:
@@ -61,6 +61,10 @@ def restore(
         folder = read_settings(data_dir=data).data_dir
         found = write_back(backup, folder)
         sys.stdout.write(
-            f"{folder}: {found.blobs} files and {found.sessions} sessions; "
+            f"{folder}: {found.blobs} files and {found.sessions} sessions{_away(found.removed)}; "
             f"start it with rigwright serve --data {folder}\n"
         )
+
+
+def _away(removed: int) -> str:
+    return f" and {removed} deleted ones that can be restored" if removed else ""
