@@ -9,6 +9,7 @@ import numpy as np
 
 from calibration.detection.detections import Detections
 from calibration.detection.gates import Rule
+from calibration.detection.opencv import homography
 from calibration.observations import Carrier
 from calibration.targets.kinds import TargetPlan
 from geometry.arrays import Floats
@@ -19,6 +20,9 @@ FEWEST = 4
 FLAT_MM = 0.5
 """Targets of one side lie in a plane to this."""
 
+
+WITHIN_PX = 3.0
+"""Points that lie farther from where the others of their plane say are left out."""
 
 ON_A_LINE = 0.02
 """Places whose spread across is a smaller share of that along count as on one line."""
@@ -53,8 +57,6 @@ def middle_of(detections: Detections, plan: TargetPlan) -> Middle | None:
 
 
 def _middle(pixels: Mapping[str, tuple[float, ...]], carrier: Carrier) -> Floats | None:
-    import cv2
-
     if not pixels:
         return None
     if len(carrier.ids) == 1:
@@ -66,11 +68,11 @@ def _middle(pixels: Mapping[str, tuple[float, ...]], carrier: Carrier) -> Floats
     side = np.abs(places[:, 2] - seen[0, 2]) < FLAT_MM
     if len(pixels) < FEWEST or np.ptp(seen[:, 2]) > FLAT_MM or not _spread(seen[:, :2]):
         return None
-    matrix, _ = cv2.findHomography(seen[:, :2], np.array(list(pixels.values())))
-    if np.shape(matrix) != (3, 3):
+    fitted = homography(seen[:, :2], np.array(list(pixels.values())), WITHIN_PX)
+    if fitted is None:
         return None
     middle = np.append(places[side, :2].mean(axis=0), 1.0)
-    x, y, scale = matrix @ middle
+    x, y, scale = fitted[0] @ middle
     return np.array([x / scale, y / scale])
 
 

@@ -1,4 +1,4 @@
-"""Picture files to pixels and back: the one place in acquisition that codes pictures by OpenCV.
+"""Picture files to pixels and back: the one place in acquisition where OpenCV works on pictures.
 
 OpenCV is imported when it is used: many commands start without it.
 """
@@ -38,6 +38,32 @@ def _read(data: bytes, flags: int) -> Image | None:
         # Each damaged file makes the library throw something else, or return nothing.
         return None
     return pixels  # type: ignore[return-value]  # its types say what other flags could give
+
+
+def shrunk(pixels: Image, most_px: int) -> Image:
+    """The picture, its longer side at most so many pixels; each is the mean of those it covers."""
+    import cv2
+
+    height, width = pixels.shape[:2]
+    scale = min(1.0, most_px / max(height, width))
+    if scale == 1.0:
+        return pixels
+    size = (max(1, round(width * scale)), max(1, round(height * scale)))
+    return cv2.resize(pixels, size, interpolation=cv2.INTER_AREA)  # type: ignore[return-value]  # as given
+
+
+def smoothed(grey: NDArray[np.float32], sigma_px: float) -> NDArray[np.float32]:
+    """A picture (H, W) smoothed by a Gaussian."""
+    import cv2
+
+    return np.asarray(cv2.GaussianBlur(grey, (0, 0), sigma_px), dtype=np.float32)
+
+
+def largest_near(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    """The largest among each value (H, W) and its eight neighbours."""
+    import cv2
+
+    return np.asarray(cv2.dilate(values, np.ones((3, 3), np.uint8)), dtype=np.float32)
 
 
 def jpeg(pixels: NDArray[np.uint8]) -> bytes:

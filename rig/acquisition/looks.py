@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.acquisition.cameras.base import Frame, Image
-from rig.acquisition.imaging import decoded, jpeg
+from rig.acquisition.imaging import decoded, jpeg, largest_near, shrunk, smoothed
 
 Singles = NDArray[np.float32]
 
@@ -101,14 +101,10 @@ def look_at(pixels: Image) -> Look:
 
 def small_jpeg(pixels: Image, look: Look) -> tuple[bytes, float]:
     """A JPEG of at most :data:`SMALL_PX`, and by how much a dark picture was brightened for it."""
-    import cv2
-
     gain = 1.0
     if look.dark:
         gain = min(_SHOWN_LEVEL / max(look.level, 1e-3), _MOST_GAIN)
-    scale = min(1.0, SMALL_PX / max(look.size_px))
-    size = (max(1, round(look.size_px[0] * scale)), max(1, round(look.size_px[1] * scale)))
-    small = cv2.resize(pixels, size, interpolation=cv2.INTER_AREA)
+    small = shrunk(pixels, SMALL_PX)
     shown = small.astype(np.float32) * (255.0 * gain / np.iinfo(pixels.dtype).max)
     return jpeg(np.clip(np.rint(shown), 0, 255).astype(np.uint8)), gain
 
@@ -120,21 +116,17 @@ def _grey(pixels: Image) -> Singles:
 
 def _steepness(grey: Singles, sigma_px: float) -> Singles:
     """How steep a smoothed picture is at each pixel but those of the border, per pixel."""
-    import cv2
-
-    smooth = np.asarray(cv2.GaussianBlur(grey, (0, 0), sigma_px))
+    smooth = smoothed(grey, sigma_px)
     across = 0.5 * (smooth[1:-1, 2:] - smooth[1:-1, :-2])
     down = 0.5 * (smooth[2:, 1:-1] - smooth[:-2, 1:-1])
     return np.asarray(np.hypot(across, down), dtype=np.float32)
 
 
 def _blur_px(fine: Singles, coarse: Singles) -> float | None:
-    import cv2
-
     if fine.size == 0:
         return None
     steep = max(float(np.quantile(fine, 1.0 - _STEEPEST_SHARE)), _LEAST_STEP)
-    peak = (fine >= steep) & (fine >= cv2.dilate(fine, np.ones((3, 3), np.uint8)))
+    peak = (fine >= steep) & (fine >= largest_near(fine))
     if np.count_nonzero(peak) < _FEWEST_EDGES:
         return None
     square = (fine[peak] / coarse[peak]) ** 2

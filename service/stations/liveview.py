@@ -7,7 +7,6 @@ from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Literal
 
-import cv2
 from pydantic import Field
 
 from calibration.detection.finding import find_targets
@@ -17,6 +16,7 @@ from common.errors import DeviceError
 from rig.acquisition.cameras.base import Image
 from rig.acquisition.capture.liveview import LivePicture
 from rig.acquisition.capture.rig import Rig
+from rig.acquisition.imaging import shrunk
 from rig.acquisition.looks import Look, look_at, pixels_of, small_jpeg
 from rig.design.aiming import Pixel, datum_pixel, turn_to
 from service.kinds.base import Figure, Result
@@ -163,11 +163,10 @@ def _found(pixels: Image, asked: Asked) -> tuple[Pixel | None, Literal["target",
     if asked.targets is None:
         return None, None
     plan = read_targets(asked.targets)
-    scale = min(1.0, SEARCHED_PX / max(width, height))
-    size = (round(width * scale), round(height * scale))
-    ordered = cv2.cvtColor(pixels, cv2.COLOR_RGB2BGR) if pixels.ndim == 3 else pixels
-    small = cv2.resize(ordered, size, interpolation=cv2.INTER_AREA) if scale < 1.0 else ordered
-    middle = middle_of(find_targets(small, plan, explain=False), plan)
+    small = shrunk(pixels, SEARCHED_PX)
+    scale = small.shape[1] / width
+    ordered = small[..., ::-1] if small.ndim == 3 else small
+    middle = middle_of(find_targets(ordered, plan, explain=False), plan)
     if middle is None:
         return None, None
     x_px, y_px = middle.pixel
