@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 from fastapi import APIRouter, Response
@@ -13,9 +14,11 @@ from service.api.job_routes import JobResource
 from service.api.models import IdempotencyKeyHeader, Job, problems
 from service.api.submission import Submission, asked, submit
 from service.kinds.base import Id, Model, RunContext
+from service.kinds.design import RigExample
 from service.kinds.study import STUDY, StudyRequest, StudyResult, head_role
 from service.store.jobrecords import JobInput
 from service.store.scans import ScanRecord
+from service.tasks.examples import rig_of_file
 
 router = APIRouter(tags=["studies"])
 
@@ -81,6 +84,18 @@ def _one_way(scans: list[ScanRecord]) -> dict[str, str | float]:
             "upload them again with the same, or save them alike",
         )
     return scans[0].options
+
+
+@router.get(
+    resource.path + "/{job_id}/recommended",
+    response_model=RigExample,
+    response_model_exclude_unset=True,
+    responses=problems(404, 409),
+)
+def read_recommended_rig(service: ServiceDep, job_id: str) -> RigExample:
+    """Read the recommended rig, to be sent with a design. 404 where none is recommended."""
+    file = resource.file(service, job_id, "recommended.toml")
+    return rig_of_file(Path(file.path), "recommended.toml")
 
 
 resource.add_to(router)

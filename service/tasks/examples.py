@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from pathlib import Path
 
 from common.files.strict import validated
 from common.files.toml import parsed
@@ -17,6 +18,15 @@ def example_rigs() -> tuple[RigExample, ...]:
     return tuple(_example(name) for name in example_names())
 
 
+def rig_of_file(path: Path, name: str) -> RigExample:
+    """What a rig file says, and no more."""
+    return _read(path.read_text(encoding="utf-8"), name)
+
+
 def _example(name: str) -> RigExample:
-    data = parsed(example_text(name), name, "rig", "rig file")
+    return _read(example_text(name), name)
+
+
+def _read(text: str, name: str) -> RigExample:
+    data = parsed(text, name, "rig", "rig file")
     return RigExample(name=name, rig=validated(RigFile, data, name))

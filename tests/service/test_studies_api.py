@@ -76,6 +76,11 @@ def test_a_study_is_asked_for_followed_and_read(in_process: TestClient) -> None:
     study = client.get(f"{job['links']['self']}/study").json()
     assert study["heads"] == ["targets.xyz"]
     assert "Recommended" in client.get(f"{job['links']['self']}/report").text
+    best = client.get(f"{job['links']['self']}/recommended").json()["rig"]
+    assert best["cameras"] == job["result"]["recommended"]["cameras"]
+    wanted = client.post("/v1/designs", json={"scan_id": asked["scan_ids"][0], "rig": best})
+    assert wanted.status_code == 201, wanted.text
+    client.post(wanted.json()["links"]["cancel"])
     # The same designs under another name: none is computed again.
     again = client.post("/v1/studies", json=asked | {"head_names": ["the wall"]})
     assert ended(client, again.json())["result"]["reused"] == 2

@@ -13,6 +13,6 @@ export function asking(title, words, inputs, lacking, ask) {
       fill(said, problem(error));
     }
   };
-  return h("form", { class: "card", onsubmit: go }, h("h2", {}, title),
-    lacking ? h("p", {}, lacking) : [h("div", { class: "fields" }, inputs), h("button", { type: "submit", class: "main configure" }, words), said]);
+  return h("form", { class: "card configure", onsubmit: go }, h("h2", {}, title),
+    lacking ? h("p", {}, lacking) : [h("div", { class: "fields" }, inputs), h("button", { type: "submit", class: "main" }, words), said]);
 }

@@ -28,7 +28,7 @@ async function form(root, wanted, signal) {
     }
   };
   fill(root, h("h1", {}, "Plan a mount"),
-    designs.length ? h("form", { class: "card", onsubmit: go }, h("div", { class: "fields" }, field("Design", which), field("Built of", kind)),
+    designs.length ? h("form", { class: "card configure", onsubmit: go }, h("div", { class: "fields" }, field("Design", which), field("Built of", kind)),
       h("button", { type: "submit", class: "main" }, "Plan it"), said)
       : h("p", {}, "There is no finished design yet. ", h("a", { href: "#/design" }, "Make one"), "."),
     h("h2", {}, "Plans"), await jobs("/v1/plans", "build", (job) => (job.result ? `${job.result.name || "Plan"}, ${job.result.system}` : "Plan"), signal));

@@ -64,7 +64,7 @@ function targetsForm(designs) {
   const which = choice(designs, designs[0]?.[0]);
   const said = h("div", {});
   if (!designs.length) return h("p", { class: "note" }, "With a design, targets that suit its cameras are proposed here.");
-  return h("div", { class: "row" }, field("For the cameras of", which), h("button", { type: "button", class: "quiet", onclick: async () => {
+  return h("div", { class: "row configure" }, field("For the cameras of", which), h("button", { type: "button", class: "quiet", onclick: async () => {
     try {
       const made = await post("/v1/target-set-proposals", { design_id: which.value });
       fill(said, h("p", { class: "good" }, `${made.target_set.targets} targets.`), h("ul", {}, made.notes.map((note) => h("li", {}, note))),

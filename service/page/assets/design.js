@@ -44,7 +44,7 @@ async function form(root, signal) {
     }
   };
   fill(root, h("h1", {}, "Design a rig"),
-    h("form", { onsubmit: go, novalidate: true },
+    h("form", { class: "configure", onsubmit: go, novalidate: true },
       h("section", { class: "card" }, h("h2", {}, "1. The head"), scan.element),
       h("section", { class: "card" }, h("h2", {}, "2. The rig"),
         h("div", { class: "fields" }, field("Cameras", count, "How many to place."), field("Begin with", example)), place),
@@ -104,7 +104,7 @@ async function outcome(job, signal) {
     result.conflicts.length ? table("What would have to give way", ["Limit", "With the others", "Alone"], result.conflicts.map((one) =>
       [one.family, number(one.give, one.unit), number(one.give_alone, one.unit)])) : null,
     figures([["Cameras", result.cameras], ["Sigma, median", microns(result.sigma_median_mm)], ["Sigma, 95 %", microns(result.sigma_p95_mm)], ...seen]),
-    h("div", { class: "row" }, h("a", { class: "button main", href: `#/build/new/${encodeURIComponent(job.id)}` }, "Plan its mount"), await exportsOf(job, signal)),
+    h("div", { class: "row" }, h("a", { class: "button main configure", href: `#/build/new/${encodeURIComponent(job.id)}` }, "Plan its mount"), await exportsOf(job, signal)),
     frame("Report", `${job.links.self}/report`),
     await files(job, signal),
   ];

@@ -8,9 +8,10 @@ import { calibration } from "./calibration.js";
 import { design } from "./design.js";
 import { rig } from "./rig.js";
 import { sessions } from "./sessions.js";
+import { studies } from "./studies.js";
 import { surface } from "./surface.js";
 
-const VIEWS = { rig, sessions, calibration, surface, design, build };
+const VIEWS = { rig, sessions, calibration, surface, design, studies, build };
 let leave = new AbortController();
 let asking = false;
 

@@ -14,6 +14,7 @@ from page_visits import Visit, served
 from stations import write_station
 
 from service.api.reconstructions import ReconstructionBody
+from service.api.studies import StudyBody
 
 if TYPE_CHECKING:
     from playwright.sync_api import Route
@@ -154,7 +155,45 @@ def test_a_surface_is_asked_for_with_what_was_chosen(visits: tuple[Visit, Visit]
     assert len(asked.pictures.captures) == 1
 
 
-@pytest.mark.parametrize("view", ["Calibration", "Surface", "Design", "Build"])
+@pytest.mark.slow
+def test_a_study_is_asked_for_with_what_was_chosen(visits: tuple[Visit, Visit]) -> None:
+    """For scans that only the browser is told of."""
+    one, _ = visits
+    scans = [
+        {"id": name, "filename": f"{name}.ply", "extents_mm": [1, 1, 1], "notes": []}
+        for name in ("anna", "bert")
+    ]
+    refused = {"type": "/problems/conflict/queue-full", "detail": "too many wait; ask later"}
+    bodies: list[str] = []
+
+    def ask(route: Route) -> None:
+        if route.request.method == "GET":
+            route.continue_()
+            return
+        bodies.append(str(route.request.post_data))
+        route.fulfill(status=503, json=refused)
+
+    one.page.route(
+        "**/v1/scans?*", lambda route: route.fulfill(json={"items": scans, "next": None})
+    )
+    one.page.route("**/v1/studies", ask)
+    one.go("Studies")
+    one.page.get_by_label("bert.ply").check()
+    one.page.get_by_label("Cameras", exact=True).fill("3, 4 5")
+    one.page.get_by_label("Seeds").fill("1,2")
+    one.page.get_by_label("Form", exact=True).select_option("both")
+    one.sound()
+    one.press("Compare them")
+    one.see("too many wait")
+    one.page.unroute_all()
+    one.faults.clear()  # the browser tells of the refusal on its console
+    (asked,) = [StudyBody.model_validate_json(body) for body in bodies]
+    grid = asked.study.grid
+    assert (asked.scan_ids, grid.cameras, grid.seed) == (["anna", "bert"], [3, 4, 5], [1, 2])
+    assert list(grid.form or ()) == ["free", "symmetric"]
+
+
+@pytest.mark.parametrize("view", ["Calibration", "Surface", "Design", "Studies", "Build"])
 def test_views_of_an_empty_service(visits: tuple[Visit, Visit], view: str) -> None:
     one, _ = visits
     one.go(view)

@@ -37,6 +37,12 @@ def test_who_has_a_key_comes_in_and_may_what_it_says(
         one.see("Your key may look and stop.")
         for button in ("Fire", "Self-test", "Reset the box"):
             assert one.page.get_by_role("button", name=button, exact=True).count() == 0
+        for view in ("Design", "Build", "Calibration", "Surface", "Studies"):
+            one.go(view)
+            one.page.locator("main h1").first.wait_for()
+            one.page.wait_for_load_state("networkidle")
+            assert one.page.locator("main form:visible").count() == 0
+            assert one.page.get_by_role("button", name="Propose targets").count() == 0
         links = one.page.get_by_role("navigation").get_by_role("link").all()
         assert len({link.bounding_box()["y"] for link in links}) == 1  # type: ignore[index]
         one.press("Sign out")
