@@ -6,6 +6,7 @@ import time
 from dataclasses import dataclass, replace
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from common.errors import CancelledError, InputError
 from common.progress import CancelToken, NeverCancelled, Progress, ProgressCallback, ignore_progress
@@ -14,7 +15,8 @@ from geometry.camera import Camera, RigCamera
 from geometry.frames import Pose
 from geometry.subject import Subject
 from solver.coverage.views import judge
-from solver.infeasibility import conflicts
+from solver.feasibility.contradictions import Hopeless, hopeless
+from solver.infeasibility import conflicts, missed
 from solver.limits import Limits
 from solver.outer_loop import StartResult
 from solver.pool import StartJob, run_all
@@ -144,6 +146,13 @@ def design(
     began = time.monotonic()
     tell = _Teller(progress)
     tell.stage("start", 0.0)
+    with threadpool_limits(1):
+        told = hopeless(subject, camera, limits, count + len(fixed))
+    if told is not None:
+        at_once = _told_at_once(request, told, began)
+        if not at_once.feasible:
+            tell.stage("done", 1.0)
+            return at_once
     jobs = _searched_jobs(request, token)
     tell.expect(0, len(jobs))
     results = run_all(jobs, workers, tell.step, token) if jobs else []
@@ -188,6 +197,32 @@ def design(
     )
     tell.stage("done", 1.0)
     return Design(problem.placed(values), quality, problem.cameras, begin, limits, report)
+
+
+def _told_at_once(request: Request, told: Hopeless, began: float) -> Design:
+    """A first network, where no network can hold the limits: given or k-means, not optimised."""
+    subject, camera, names = request.subject, request.camera, request.names
+    placed = kmeans_start(subject, camera, request.limits, names, request.seed)
+    if request.start is not None:
+        poses = zip(names, request.start, strict=True)
+        placed = tuple(camera_at(camera, name, pose, _target(subject)) for name, pose in poses)
+    problem = request.problem(placed)
+    quality = evaluate(subject, problem.cameras, request.limits, problem.anchor)
+    report = SolverReport(
+        engine="none",
+        status=Status.INFEASIBLE,
+        why_stopped=f"nothing was searched: {told}",
+        kkt_error=np.nan,
+        iterations=0,
+        rounds=0,
+        seed=request.seed,
+        seconds=time.monotonic() - began,
+        starts=(),
+        conflicts=missed(quality),
+        contradiction=str(told),
+    )
+    begun = (*problem.cameras,)  # another tuple: a rig whose start is its design stands already
+    return Design(problem.cameras, quality, begun, quality, request.limits, report)
 
 
 class _Teller:

@@ -22,7 +22,7 @@ from solver.nlp.program import NonlinearProgram
 from solver.nlp.sqp import Outcome, minimise
 from solver.problem import Problem
 from solver.quality import evaluate
-from solver.result import Relaxation
+from solver.result import Quality, Relaxation
 
 _HARD = 1000.0
 """How much dearer a violation of the other families is, when one alone is asked to give way."""
@@ -65,6 +65,16 @@ def conflicts(problem: Problem, values: Floats, cancel: CancelToken) -> tuple[Re
         enough = all(left[f] <= 10.0 * SATISFIED for f in program.families if f != name)
         out += _relaxations(problem, name, nearest.values, found.values if enough else None)
     return (*out, *_coverage(problem, nearest.values, {c.family for c in out}))
+
+
+def missed(quality: Quality) -> tuple[Relaxation, ...]:
+    """What a network that nobody optimised misses, family by family."""
+    worst: dict[str, Relaxation] = {}
+    for row in quality.violated:
+        before = worst.get(row.family)
+        if before is None or -row.slack > before.amount:
+            worst[row.family] = Relaxation(row.family, row.unit, -row.slack, None)
+    return tuple(worst.values())
 
 
 def _relaxations(

@@ -177,6 +177,8 @@ class SolverReport:
     """Why the solver stopped and how good its answer is as an optimum.
 
     ``starts_note``: why starts were tried that the strategy is not made of, if any were.
+    ``contradiction``: which limits no design can hold together and what to relax, where that was
+    found before anything was searched.
     """
 
     engine: str
@@ -190,6 +192,7 @@ class SolverReport:
     starts: tuple[StartReport, ...]
     conflicts: tuple[Relaxation, ...] = ()
     starts_note: str = ""
+    contradiction: str | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from geometry.arrays import Floats
+from geometry.arrays import Bools, Floats
 from geometry.subject import Subject
 from solver.limits import Box, HalfSpace, Sphere, Zone, ZoneOrigin, Zones
 
@@ -39,6 +39,19 @@ def in_rig_frame(zones: Zones, subject: Subject) -> Zones:
         tuple(_moved(zone, by) for zone in zones.forbidden),
         ZoneOrigin.RIG,
     )
+
+
+def inside_any(zones: tuple[Zone, ...], places_mm: Floats) -> Bools:
+    """Which places (m, 3) lie in any of the zones, (m,)."""
+    out = np.zeros(len(places_mm), dtype=np.bool_)
+    for zone in zones:
+        if isinstance(zone, HalfSpace):
+            out |= places_mm @ zone.normal >= zone.offset_mm
+        elif isinstance(zone, Sphere):
+            out |= np.linalg.norm(places_mm - zone.centre_mm, axis=1) <= zone.radius_mm
+        else:
+            out |= ((places_mm >= zone.low_mm) & (places_mm <= zone.high_mm)).all(axis=1)
+    return out
 
 
 def _moved(zone: Zone, by_mm: Floats) -> Zone:

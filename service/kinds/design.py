@@ -70,6 +70,11 @@ class DesignResult(EvaluationResult):
     why_stopped: str
     start_cost_mm2: Figure
     conflicts: list[Conflict]
+    contradiction: str | None = Field(
+        default=None,
+        description="Which limits no design can hold together and what to relax, where that was "
+        "found before anything was searched.",
+    )
     collisions: int
     seconds: float
     placed: Annotated[

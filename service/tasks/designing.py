@@ -135,6 +135,7 @@ def _result(made: Design, layout: Layout, prepared: PreparedSubject, spec: RigSp
         why_stopped=made.solver.why_stopped,
         start_cost_mm2=float(made.start_quality.cost_mm2),
         conflicts=conflicts,
+        contradiction=made.solver.contradiction,
         collisions=len(layout.collisions),
         seconds=made.solver.seconds,
         placed=spec.count,

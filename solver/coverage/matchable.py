@@ -13,12 +13,12 @@ from geometry.raycast import Occluder
 from geometry.subject import Subject
 from geometry.surface import SurfacePoints
 from solver.coverage.visibility import Visibility, cast_rays
-from solver.limits import HalfSpace, Limits, Sphere, Zone
+from solver.limits import Limits
 from solver.matching import Matching
 from solver.motion import HeadPosition, rest
 from solver.problem import Problem
 from solver.variables import NetworkState
-from solver.zones import in_rig_frame
+from solver.zones import in_rig_frame, inside_any
 
 _STEPS_DEG = (18.0, 6.0)
 """How far apart the places are that cameras could take: fine where the coarse ones see nothing."""
@@ -170,8 +170,8 @@ def reachable(subject: Subject, limits: Limits) -> Bools:
     out = np.zeros(len(subject.check_points), dtype=np.bool_)
     for step_deg in (s for s in _STEPS_DEG if s <= max(matching.max_angle_deg, _STEPS_DEG[-1])):
         eyes = middle + distance * _outward(subject, step_deg)
-        keep = np.ones(len(eyes), dtype=np.bool_) if not allowed else _inside(allowed, eyes)
-        eyes = eyes[keep & ~_inside(forbidden, eyes)]
+        keep = np.ones(len(eyes), dtype=np.bool_) if not allowed else inside_any(allowed, eyes)
+        eyes = eyes[keep & ~inside_any(forbidden, eyes)]
         left = np.flatnonzero(~out)
         if len(left):
             points = left.tobytes(), eyes.tobytes()
@@ -191,19 +191,6 @@ def _outward(subject: Subject, step_deg: float) -> Floats:
     length = float(np.linalg.norm(facing))
     # A subject that faces everywhere is looked at from everywhere.
     return every if length < 0.1 else every[every @ facing >= length * np.cos(_WIDEST_RAD)]
-
-
-def _inside(zones: tuple[Zone, ...], places_mm: Floats) -> Bools:
-    """Which places (m, 3) lie in any of the zones, (m,)."""
-    out = np.zeros(len(places_mm), dtype=np.bool_)
-    for zone in zones:
-        if isinstance(zone, HalfSpace):
-            out |= places_mm @ zone.normal >= zone.offset_mm
-        elif isinstance(zone, Sphere):
-            out |= np.linalg.norm(places_mm - zone.centre_mm, axis=1) <= zone.radius_mm
-        else:
-            out |= ((places_mm >= zone.low_mm) & (places_mm <= zone.high_mm)).all(axis=1)
-    return out
 
 
 @lru_cache(maxsize=16)

@@ -143,6 +143,8 @@ def _why_infeasible(result: DesignResult) -> str:
     families = list(dict.fromkeys(name.split("/", 1)[0] for name in result.violated))
     if result.placed == 0:
         return f"the rig as it stands breaks limits ({', '.join(families)}); its report was written"
+    if result.contradiction is not None:
+        return f"the limits cannot all be met: {result.contradiction}; a first network was written"
     in_conflict = [row.family for row in result.conflicts] or families
     return (
         f"the limits cannot all be met ({', '.join(in_conflict)}); the nearest design was written, "

@@ -1,0 +1,1 @@
+"""Limits that no rig can hold, told before anything is searched."""
