@@ -173,6 +173,27 @@ class Relaxation:
 
 
 @dataclass(frozen=True)
+class Bound:
+    """How good any network on a grid of candidates could be.
+
+    ``lower_mm2``: the mean |Q| of none is below this. ``cost_mm2``: that of the design, over the
+    same ``points``, which are weighted to stand for all. ``candidates``: how many were looked at.
+    ``unseen_share``: share of all check points that no two of them, the design's included, see.
+    """
+
+    lower_mm2: float
+    cost_mm2: float
+    candidates: int
+    points: int
+    unseen_share: float
+
+    @property
+    def gap_share(self) -> float:
+        """By which share of it the design's cost could at most be less, 0 to 1."""
+        return 1.0 - self.lower_mm2 / self.cost_mm2
+
+
+@dataclass(frozen=True)
 class SolverReport:
     """Why the solver stopped and how good its answer is as an optimum.
 
@@ -193,6 +214,7 @@ class SolverReport:
     conflicts: tuple[Relaxation, ...] = ()
     starts_note: str = ""
     contradiction: str | None = None
+    bound: Bound | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -156,6 +156,17 @@ class ConflictFigures(StrictModel):
     give_alone: Number = Field(description="By how much if it alone gave way; null: not enough.")
 
 
+class BoundFigures(StrictModel):
+    """How good any network on a grid of candidates could be."""
+
+    lower_mm2: float = Field(description="The mean |Q| of no network on the grid is below this.")
+    cost_mm2: float = Field(description="That of the design, over the same points.")
+    gap_share: float = Field(description="By which share of it the cost could at most be less.")
+    candidates: int = Field(description="How many places were looked at.")
+    points: int = Field(description="How many check points, weighted to stand for all.")
+    unseen_share: float = Field(description="Share of the check points that no two places see.")
+
+
 class SolverFigures(StrictModel):
     """Why the solver stopped and how good its answer is."""
 
@@ -171,6 +182,9 @@ class SolverFigures(StrictModel):
     conflicts: list[ConflictFigures] = Field(description="Limits that contradict each other.")
     starts_note: str = Field(
         default="", description="Why starts were tried that the strategy is not made of."
+    )
+    bound: BoundFigures | None = Field(
+        default=None, description="How good any other network could be, where that was asked for."
     )
 
 

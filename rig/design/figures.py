@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from common.files.plain import number
 from geometry.arrays import Floats
 from solver.coverage.matchable import Matchable
-from solver.result import ConstraintRow, Quality, SolverReport
+from solver.result import Bound, ConstraintRow, Quality, SolverReport
 
 UPPER_TRIANGLE = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 """Order of a covariance in files: xx, xy, xz, yy, yz, zz."""
@@ -143,4 +144,11 @@ def solver_figures(report: SolverReport) -> dict[str, Any]:
             for conflict in report.conflicts
         ],
         "starts_note": report.starts_note,
+        **_bound(report.bound),
     }
+
+
+def _bound(bound: Bound | None) -> dict[str, Any]:
+    if bound is None:
+        return {}
+    return {"bound": {**asdict(bound), "gap_share": bound.gap_share}}

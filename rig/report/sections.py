@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from common.page.html import element, esc, figure_text, plot, section
+from common.page.html import element, esc, figure_text, percent, plot, section
 from geometry.scan import ScanNote
 from geometry.subject import Subject
 from rig.design.layout import Layout
@@ -12,7 +12,7 @@ from rig.report import tables
 from rig.report.drawings import array_drawing, footprint
 from rig.report.ellipsoids import Ellipsoids
 from rig.report.matchable import matchable
-from solver.result import Design, Status
+from solver.result import Bound, Design, Status
 
 
 def rig(stills: Mapping[str, str]) -> str:
@@ -228,12 +228,30 @@ def solver(design: Design) -> str:
         words += " No start led to a design that holds all limits; the nearest is shown."
     if report.starts_note:
         words += f" Of the starts: {esc(report.starts_note)}."
+    if report.bound is not None:
+        words += f" {_bounded(report.bound)}"
     content = tables.starts_table(report) if report.starts else ""
     if report.conflicts:
         content = (
             _titled("Limits that contradict each other", tables.conflict_table(report)) + content
         )
     return section("solver", "The solver's word", words, content)
+
+
+def _bounded(bound: Bound) -> str:
+    """How good it could be at most, and what that speaks of."""
+    unseen = ""
+    if bound.unseen_share > 0.0:
+        unseen = (
+            f" {percent(bound.unseen_share)} of the points are seen by no two of these places: "
+            "no design measures them."
+        )
+    return (
+        f"<b>No network of as many cameras on a grid of {bound.candidates} places has a mean |Q| "
+        f"below {figure_text(bound.lower_mm2)} mm²</b>; that of the design, over the same points, "
+        f"is {figure_text(bound.cost_mm2)} mm², so at most {percent(bound.gap_share)} could be "
+        f"gained there, limits between cameras and coverage not counted.{unseen}"
+    )
 
 
 def scan(notes: tuple[ScanNote, ...], scan_name: str) -> str:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from common.progress import CancelToken, ProgressCallback, ignore_progress
 from geometry.subject import Subject
 from rig.specification.spec import RigSpec
 from solver.design import design
 from solver.result import Design
+from solver.search.bound import bound_of
 from solver.standing import as_it_stands
 
 
@@ -15,16 +18,18 @@ def solved(
     spec: RigSpec,
     *,
     workers: int = 1,
+    bound: bool = False,
     progress: ProgressCallback = ignore_progress,
     cancel: CancelToken | None = None,
 ) -> Design:
     """The cameras that ``spec`` asks for before ``subject``, or those it has where none is placed.
 
+    With ``bound`` a design that holds its limits says how good any other could be.
     Raises as :func:`solver.design.design`.
     """
     if spec.count == 0:
         return as_it_stands(subject, spec.fixed, spec.limits, spec.seed)
-    return design(
+    made = design(
         subject,
         spec.camera,
         spec.limits,
@@ -38,3 +43,7 @@ def solved(
         progress=progress,
         cancel=cancel,
     )
+    if not bound or not made.feasible:
+        return made
+    found = bound_of(subject, spec.camera, spec.limits, made.cameras, cancel)
+    return replace(made, solver=replace(made.solver, bound=found))

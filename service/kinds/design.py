@@ -61,6 +61,17 @@ class Conflict(Result):
     ]
 
 
+class DesignBound(Model):
+    """How good any network on a grid of candidates could be, in short."""
+
+    lower_mm2: Annotated[float, Field(description="No network's mean |Q| is below this.")]
+    cost_mm2: Annotated[float, Field(description="The design's, over the same points.")]
+    gap_share: Annotated[float, Field(description="By which share of it that could be less.")]
+    candidates: int
+    points: int
+    unseen_share: Annotated[float, Field(description="Points that no two candidates see.")]
+
+
 class DesignResult(EvaluationResult):
     """The figures of a design. When the limits contradict each other it is the nearest one."""
 
@@ -74,6 +85,9 @@ class DesignResult(EvaluationResult):
         default=None,
         description="Which limits no design can hold together and what to relax, where that was "
         "found before anything was searched.",
+    )
+    bound: DesignBound | None = Field(
+        default=None, description="How good it could be at most; null where a limit is broken."
     )
     collisions: int
     seconds: float

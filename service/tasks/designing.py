@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import asdict
 from pathlib import Path
 
 import trimesh
@@ -22,7 +23,7 @@ from rig.specification.solving import solved
 from rig.specification.spec import RigSpec
 from service.jobs.engine import Running, Task
 from service.kinds.base import Note
-from service.kinds.design import Conflict, DemoRequest, DesignRequest, DesignResult
+from service.kinds.design import Conflict, DemoRequest, DesignBound, DesignRequest, DesignResult
 from service.kinds.evaluation import Coverage, EvaluationRequest, EvaluationResult
 from service.tasks.reading import notes_of
 from solver.quality import evaluate
@@ -82,6 +83,7 @@ def _designed(
         prepared.subject,
         spec,
         workers=workers,
+        bound=True,
         progress=within(running.report, _READING, _DESIGNING),
         cancel=running.cancel,
     )
@@ -121,6 +123,7 @@ def _scored(quality: Quality, names: list[str], prepared: PreparedSubject) -> Ev
 def _result(made: Design, layout: Layout, prepared: PreparedSubject, spec: RigSpec) -> DesignResult:
     """A design in short."""
     scored = _scored(made.quality, [c.name for c in made.cameras], prepared)
+    bound = made.solver.bound
     conflicts = [
         Conflict(family=c.family, unit=c.unit, give=c.amount, give_alone=c.amount_alone)
         for c in made.solver.conflicts
@@ -136,6 +139,7 @@ def _result(made: Design, layout: Layout, prepared: PreparedSubject, spec: RigSp
         start_cost_mm2=float(made.start_quality.cost_mm2),
         conflicts=conflicts,
         contradiction=made.solver.contradiction,
+        bound=None if bound is None else DesignBound(**asdict(bound), gap_share=bound.gap_share),
         collisions=len(layout.collisions),
         seconds=made.solver.seconds,
         placed=spec.count,

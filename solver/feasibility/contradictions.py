@@ -20,7 +20,7 @@ from solver.limits import Box, HalfSpace, Limits, Sphere, Zone
 from solver.zones import in_rig_frame
 
 _SHARE_MARGIN = 0.01
-_PAIR_MARGIN = 0.1
+_BETWEEN_PAIRS = 0.1
 """Base/height between the places looked at and those between them: 5.7 degrees are 0.1."""
 
 
@@ -257,10 +257,12 @@ def _apart(found: Places, count: int) -> Iterator[Hopeless]:
     away = found.distance_mm[found.standing]
     least = limits.base_height.min
     if least is not None and count > 1:
-        most = _count_apart(places, away, least - 2.0 * _PAIR_MARGIN)
+        most = _count_apart(places, away, least - 2.0 * _BETWEEN_PAIRS)
         widest = _widest(places, away)
-        if widest + _PAIR_MARGIN < least or most < count:
-            room = f"{widest:.2f} at most" if widest + _PAIR_MARGIN < least else f"room for {most}"
+        if widest + _BETWEEN_PAIRS < least or most < count:
+            room = (
+                f"{widest:.2f} at most" if widest + _BETWEEN_PAIRS < least else f"room for {most}"
+            )
             yield Hopeless(
                 f"limits.base_height.min is {least:g} for {count} cameras, but where they can "
                 f"stand there is {room}",
@@ -269,7 +271,7 @@ def _apart(found: Places, count: int) -> Iterator[Hopeless]:
     gap = limits.body_clearance_mm
     if gap is not None and count > 1 and limits.stand_off.max_mm is not None:
         need = gap + float(found.camera.body.size_mm.min())
-        step = _PAIR_MARGIN * float(away.max())
+        step = _BETWEEN_PAIRS * float(away.max())
         most = _count_apart(places, np.ones(len(places)), need - 2.0 * step)
         if most < count:
             yield Hopeless(

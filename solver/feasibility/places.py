@@ -19,7 +19,7 @@ from solver.zones import in_rig_frame, inside_any
 
 STEP_DEG = 8.0
 _POINTS = 500
-_DISTANCES = 8
+_RINGS = 8
 _FARTHEST_RADII = 100.0
 _USUAL_RADII = 6.0
 _LEAST_SEEN = 3
@@ -62,10 +62,10 @@ class Places:
     def _ways(self) -> tuple[Floats, Ints, Floats]:
         """Directions (d, 3), the direction of each place (m,), and the places (m, 3)."""
         low, high = self.reach_mm
-        distance = np.geomspace(low, high, _DISTANCES)
+        distance = np.geomspace(low, high, _RINGS)
         ways = all_around(STEP_DEG)
         places = self.middle + (distance[None, :, None] * ways[:, None]).reshape(-1, 3)
-        of = np.repeat(np.arange(len(ways)), _DISTANCES)
+        of = np.repeat(np.arange(len(ways)), _RINGS)
         zones = in_rig_frame(self.limits.zones, self.subject)
         for zone in zones.allowed:
             within = _within(zone)

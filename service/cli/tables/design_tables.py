@@ -42,6 +42,11 @@ def print_figures(result: EvaluationResult, start_cost_mm2: float | None = None)
         "points in a matchable pair, of those that can be", _share(result.matchable_share)
     )
     table.add_row("groups of cameras that match", _groups(result.groups))
+    bound = result.bound if isinstance(result, DesignResult) else None
+    if bound is not None:
+        table.add_row("no network on the grid is below", _number(bound.lower_mm2, "mm\u00b2"))
+        table.add_row("could be gained at most", _share(bound.gap_share))
+        table.add_row("points that no two places see", _share(bound.unseen_share))
     Console().print(table)
 
 

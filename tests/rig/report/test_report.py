@@ -21,11 +21,11 @@ from geometry.raycast import Occluder
 from geometry.scan import ScanNote
 from geometry.subject import Subject
 from rig.design.layout import make_layout
-from rig.report import render_report
+from rig.report import render_report, sections
 from rig.report.ellipsoids import ellipsoids, exaggeration, spread_sample
 from rig.report.errormap import sigma_range_mm
 from rig.report.words import family_words
-from solver.result import Design, Relaxation, Status
+from solver.result import Bound, Design, Relaxation, Status
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
@@ -171,6 +171,15 @@ def test_broken_limits_come_first_and_are_explained(design: Design, subject: Sub
     assert "Limits that contradict each other" in text and "12.5 mm" in text
     assert "is not enough" in text
     assert "Of the starts: the search knows no &lt;spacing&gt;." in text
+
+
+def test_how_good_any_other_design_could_be_is_told_with_what_nobody_sees(design: Design) -> None:
+    assert "No network of as many" not in sections.solver(design)
+    bound = Bound(0.00087, 0.001, 484, 600, 0.0005)
+    words = sections.solver(replace(design, solver=replace(design.solver, bound=bound)))
+    assert "a grid of 484 places has a mean |Q| below 0.00087 mm²" in words
+    assert "at most 13 % could be gained" in words
+    assert "0.1 % of the points are seen by no two of these places" in words
 
 
 def test_a_subject_of_bare_points(design: Design, subject: Subject) -> None:
