@@ -218,7 +218,7 @@ def _told_at_once(request: Request, told: Hopeless, began: float) -> Design:
         seed=request.seed,
         seconds=time.monotonic() - began,
         starts=(),
-        conflicts=missed(quality),
+        conflicts=missed(quality, told.families),
         contradiction=str(told),
     )
     begun = (*problem.cameras,)  # another tuple: a rig whose start is its design stands already

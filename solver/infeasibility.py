@@ -67,10 +67,10 @@ def conflicts(problem: Problem, values: Floats, cancel: CancelToken) -> tuple[Re
     return (*out, *_coverage(problem, nearest.values, {c.family for c in out}))
 
 
-def missed(quality: Quality) -> tuple[Relaxation, ...]:
-    """What a network that nobody optimised misses, family by family."""
+def missed(quality: Quality, families: tuple[str, ...]) -> tuple[Relaxation, ...]:
+    """What a network that nobody optimised misses of limits whose names begin with ``families``."""
     worst: dict[str, Relaxation] = {}
-    for row in quality.violated:
+    for row in (r for r in quality.violated if r.family.startswith(families)):
         before = worst.get(row.family)
         if before is None or -row.slack > before.amount:
             worst[row.family] = Relaxation(row.family, row.unit, -row.slack, None)

@@ -26,10 +26,14 @@ _BETWEEN_PAIRS = 0.1
 
 @dataclass(frozen=True)
 class Hopeless:
-    """Limits that contradict each other whatever the design: which, and what to relax."""
+    """Limits that contradict each other whatever the design: which, and what to relax.
+
+    ``families``: the first words of their rows in the table of limits.
+    """
 
     problem: str
     remedy: str
+    families: tuple[str, ...]
 
     def __str__(self) -> str:
         return f"{self.problem}; {self.remedy}"
@@ -73,6 +77,7 @@ def _rooms(found: Places, count: int) -> Iterator[Hopeless]:
             f"the allowed zones of limits.zones hold {room / 1e6:.3g} litres, but {count} bodies "
             f"of {' x '.join(f'{v:g}' for v in size)} mm need {need / 1e6:.3g}",
             "allow larger zones or fewer cameras",
+            ("zone",),
         )
 
 
@@ -96,6 +101,7 @@ def _cells(found: Places, count: int) -> Iterator[Hopeless]:
             f"{why} keeps cameras {need:.0f} mm apart, so the allowed zones of limits.zones hold "
             f"{most} at most, but {count} are to stand there",
             "allow larger zones, a smaller distance between cameras, or fewer of them",
+            ("zone", "base_height", "body_clearance"),
         )
 
 
@@ -125,6 +131,7 @@ def _bodies(found: Places, _count: int) -> Iterator[Hopeless]:
             f"neighbours {near * far:.0f} mm apart at most, but their bodies need "
             f"{smallest + gap:.0f} mm with limits.bodies.clearance_mm",
             "allow a greater neighbour_max, a smaller clearance, or smaller bodies",
+            ("base_height_neighbour", "body_clearance"),
         )
     spacing = limits.spacing
     if (
@@ -137,6 +144,7 @@ def _bodies(found: Places, _count: int) -> Iterator[Hopeless]:
             f"limits.stand_off.max_mm = {far:g} no two cameras are farther apart than "
             f"{2.0 * far:g} mm",
             "give a shorter edge_mm or a greater stand-off",
+            ("spacing", "stand_off"),
         )
 
 
@@ -152,6 +160,7 @@ def _means(found: Places, _count: int) -> Iterator[Hopeless]:
             f"limits.incidence.mean_max_deg is {most:g}, but the subject's normals spread so far "
             f"that no axis meets them at less than {least:.0f} degrees on average",
             f"allow {least + 3.0:.0f} degrees or more",
+            ("incidence",),
         )
 
 
@@ -162,6 +171,7 @@ def _standing(found: Places, _count: int) -> Iterator[Hopeless]:
         yield Hopeless(
             f"limits.zones leave no place for a camera, with {_stand_off(limits)}",
             "allow other zones, forbid smaller ones, or change the stand-off",
+            ("zone", "stand_off"),
         )
         return
     if not found.useful.any():
@@ -169,6 +179,7 @@ def _standing(found: Places, _count: int) -> Iterator[Hopeless]:
             f"no camera sees anything from where limits.zones and limits.stand_off let it stand, "
             f"with rays up to limits.incidence.ray_max_deg = {limits.incidence.ray_max_deg:g}",
             "allow zones before the subject or a greater angle",
+            ("zone", "stand_off", "coverage"),
         )
         return
     if found.standing.any():
@@ -208,7 +219,8 @@ def _too_near(found: Places, first: str) -> Hopeless:
     )
     told = [words for true, words, _ in options if true]
     remedies = dict.fromkeys(remedy for true, _, remedy in options if true)
-    return Hopeless(f"{first}: {', '.join(told)}", " or ".join(remedies))
+    families = ("depth_of_field", "frame", "gsd", "stand_off", "zone")
+    return Hopeless(f"{first}: {', '.join(told)}", " or ".join(remedies), families)
 
 
 def _seeing(found: Places, _count: int) -> Iterator[Hopeless]:
@@ -229,6 +241,7 @@ def _seeing(found: Places, _count: int) -> Iterator[Hopeless]:
             f"{asked}, but {angle}{where} let {100.0 * anyhow:.1f} % be seen from anywhere",
             "ask for a smaller share, allow a greater angle or other zones, or leave out what is "
             "hidden with [subject]",
+            ("coverage",),
         )
     elif there < most - _SHARE_MARGIN:
         yield _too_near(found, f"{asked}, but {100.0 * there:.1f} % can be had as the limits ask")
@@ -248,6 +261,7 @@ def _covering(found: Places, count: int) -> Iterator[Hopeless]:
             f"{count * widest:.2f}",
             "ask for less, allow a greater angle, or give "
             f"{int(np.ceil(needed / widest))} cameras or more",
+            ("coverage",),
         )
 
 
@@ -267,6 +281,7 @@ def _apart(found: Places, count: int) -> Iterator[Hopeless]:
                 f"limits.base_height.min is {least:g} for {count} cameras, but where they can "
                 f"stand there is {room}",
                 "give a smaller ratio, fewer cameras, or more room (stand_off, zones, ray_max_deg)",
+                ("base_height",),
             )
     gap = limits.body_clearance_mm
     if gap is not None and count > 1 and limits.stand_off.max_mm is not None:
@@ -278,6 +293,7 @@ def _apart(found: Places, count: int) -> Iterator[Hopeless]:
                 f"limits.bodies.clearance_mm is {gap:g} for {count} cameras, but where they can "
                 f"stand there is room for {most}",
                 "give a smaller clearance, fewer cameras, or more room (stand_off, zones)",
+                ("body_clearance",),
             )
 
 

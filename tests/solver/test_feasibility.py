@@ -116,7 +116,8 @@ def test_a_hopeless_design_comes_back_at_once_with_its_sentence() -> None:
     assert found.solver.status is Status.INFEASIBLE and not found.feasible and not found.stands
     assert found.solver.contradiction in found.solver.why_stopped
     assert "ray_max_deg = 20" in (found.solver.contradiction or "")
-    assert "coverage_2" in {c.family for c in found.solver.conflicts}
+    # The first network misses base/height too, which has nothing to do with it.
+    assert {c.family for c in found.solver.conflicts} == {"coverage_2", "coverage_3"}
     assert len(found.cameras) == 4
 
 
