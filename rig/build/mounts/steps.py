@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from rig.build.mounts.settings import CameraMount, Setting
 from rig.build.mounts.structure import Joint, Member, Plate, Structure, Wedge
+from rig.build.parts.screws import screw_mm
+from rig.catalogue import Catalogue
 
 
-def assembly_steps(structure: Structure, mounts: tuple[CameraMount, ...]) -> tuple[str, ...]:
-    """What to do, one step after the other."""
+def assembly_steps(
+    structure: Structure, mounts: tuple[CameraMount, ...], catalogue: Catalogue
+) -> tuple[str, ...]:
+    """What to do, one step after the other; screws by the lengths that the bill has."""
+    told = tuple(_with_length(joint, structure, catalogue) for joint in structure.joints)
+    structure = replace(structure, joints=told)
     steps = [_cut(structure.members)] if structure.members else []
     steps += [_drill(plate) for plate in structure.plates]
     if structure.wedges:
@@ -89,8 +97,24 @@ def _where(joint: Joint, starts: dict[str, str]) -> str:
     return f", the middle {joint.along_mm:.0f} mm from its {start}"
 
 
+def _with_length(joint: Joint, structure: Structure, catalogue: Catalogue) -> Joint:
+    """The joint with its screws named by their length, where that is known."""
+    length = screw_mm(joint, structure, catalogue)
+    if length is None:
+        return joint
+    screws = {
+        part for part in joint.fasteners
+        if part in catalogue.fasteners and catalogue.fasteners[part].kind in ("cap-screw", "stud")
+    }  # fmt: skip
+    named = {
+        f"{part}, {length:g} mm long" if part in screws else part: count
+        for part, count in joint.fasteners.items()
+    }
+    return replace(joint, fasteners=named)
+
+
 def _with(joint: Joint) -> str:
-    parts = ", ".join(f"{count} x {part}" for part, count in joint.fasteners.items())
+    parts = " and ".join(f"{count} x {part}" for part, count in joint.fasteners.items())
     return f" with {parts}" if parts else ""
 
 

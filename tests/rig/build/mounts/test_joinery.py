@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from functools import cache
 from itertools import combinations
 
@@ -14,8 +15,10 @@ from rig.build.mounts.steps import assembly_steps
 from rig.build.mounts.structure import Member
 from rig.build.mounts.systems.base import Built
 from rig.build.statics.framing import nearest_along
+from rig.catalogue import load_catalogue
 
 KINDS = ("t-slot", "arc", "plate")
+CATALOGUE = load_catalogue()
 
 
 @cache
@@ -61,8 +64,10 @@ def test_the_start_of_a_member_is_named_by_where_it_lies() -> None:
     for way, words in ends.items():
         axis = np.array([[0.0, 0.0, 0.0], way])
         assert Member("m", "2020", "bar", axis, np.eye(3)[0], (20.0, 20.0)).start == words
-    text = " ".join(assembly_steps(built("t-slot").structure, built("t-slot").mounts))
+    text = " ".join(assembly_steps(built("t-slot").structure, built("t-slot").mounts, CATALOGUE))
     assert "mm from its lower end" in text and "from its start" not in text
+    assert re.search(r"\d x cap-screw-m5, \d+ mm long", text)
+    assert not re.search(r"\d x cap-screw-m5(?!, \d+ mm long)", text), "no screw without its length"
 
 
 def test_facets_are_mitred_where_they_meet_and_square_at_the_ends_of_their_rib() -> None:
@@ -77,5 +82,5 @@ def test_facets_are_mitred_where_they_meet_and_square_at_the_ends_of_their_rib()
     # Half the depth times the slope of the cut, at one end.
     more = first.size_mm[1] / 2.0 * np.tan(np.radians(first.mitres_deg[1]))
     assert first.long_side_mm == pytest.approx(first.length_mm + more)
-    text = " ".join(assembly_steps(built("arc").structure, built("arc").mounts))
+    text = " ".join(assembly_steps(built("arc").structure, built("arc").mounts, CATALOGUE))
     assert f"saw turned by 0.0 degrees at its {first.start} and {first.mitres_deg[1]:.1f}" in text

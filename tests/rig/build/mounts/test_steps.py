@@ -10,10 +10,15 @@ import pytest
 from mounted import slider
 
 from rig.build.mounts.settings import CameraMount, Tape
-from rig.build.mounts.steps import assembly_steps
+from rig.build.mounts.steps import assembly_steps as steps_with
 from rig.build.mounts.structure import Hole, Joint, Member, Plate, Structure, Wedge
+from rig.catalogue import load_catalogue
 
 ORIGIN = np.zeros(3)
+
+
+def assembly_steps(made: Structure, mounts: tuple[CameraMount, ...]) -> tuple[str, ...]:
+    return steps_with(made, mounts, load_catalogue())
 
 
 def member(name: str, length_mm: float) -> Member:
@@ -125,8 +130,9 @@ def test_a_camera_is_on_its_wedge_before_the_wedge_is_on_its_post() -> None:
         hang.index("plug in the cable last"),
     ]
     assert order == sorted(order)
-    assert "pocket with 1 x stud-1-4-20" in hang
-    assert "above with 2 x cap-screw-m5" in hang
+    assert "pocket with 1 x stud-1-4-20, 12 mm long" in hang
+    # 6 mm of the wedge under the head, and four fifths of 5 mm in the nut.
+    assert "above with 2 x cap-screw-m5, 10 mm long" in hang
 
 
 @pytest.mark.parametrize("made", [True, False])

@@ -155,7 +155,7 @@ def test_a_name_that_does_not_fit_is_what_is_told() -> None:
 
 def test_the_steps_put_the_camera_onto_the_wedge_before_the_wedge_onto_the_post() -> None:
     made = built(face_cameras(face(), 4))
-    steps = assembly_steps(made.structure, made.mounts)
+    steps = assembly_steps(made.structure, made.mounts, CATALOGUE)
     for mount in made.mounts:
         text = next(step for step in steps if f"Hang {mount.name}" in step)
         camera = text.index(f"{mount.name} onto {mount.name} wedge")
