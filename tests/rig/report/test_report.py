@@ -225,11 +225,23 @@ def browser() -> Iterator[Browser]:
         yield opened
 
 
+NO_WEBGL = """{
+  const every = HTMLCanvasElement.prototype.getContext;
+  HTMLCanvasElement.prototype.getContext = function (kind, ...more) {
+    return kind.startsWith("webgl") ? null : every.call(this, kind, ...more);
+  };
+}"""
+"""What a browser without it says: playwright opens no second browser beside the first."""
+
+
 class Visit:
     """A page opened in the browser, with everything it said and asked for."""
 
-    def __init__(self, browser: Browser, path: Path, scheme: str, width: int) -> None:
+    def __init__(
+        self, browser: Browser, path: Path, scheme: str, width: int, first: str = ""
+    ) -> None:
         context = browser.new_context(color_scheme=scheme, viewport={"width": width, "height": 900})
+        context.add_init_script(first)
         self.page = context.new_page()
         self.faults: list[str] = []
         self.requests: list[str] = []
@@ -268,19 +280,20 @@ def test_a_browser_draws_it(
 
 @pytest.mark.needs_browser
 @pytest.mark.slow
-def test_without_webgl_still_pictures_stand_in_for_the_scenes(page: str, tmp_path: Path) -> None:
+def test_without_webgl_still_pictures_stand_in_for_the_scenes(
+    page: str, browser: Browser, tmp_path: Path
+) -> None:
     path = tmp_path / "report.html"
     path.write_text(page, encoding="utf-8")
-    with chromium("--disable-gpu", "--disable-webgl", "--disable-webgl2") as browser:
-        visit = Visit(browser, path, "light", 1280)
-        assert visit.page.evaluate("document.body.dataset.ready") == "yes"
-        assert visit.faults == []
-        assert visit.view["figures"] == 3, "the maps need no WebGL"
-        assert visit.page.locator("#rig-3d").is_hidden()
-        stills = visit.page.locator("img.still")
-        assert [still.is_visible() for still in stills.all()] == [True] * 3
-        assert all(stills.evaluate_all("all => all.map((one) => one.naturalWidth > 0)"))
-        assert len(stills.first.screenshot()) > 20_000, "an empty picture packs to a few kilobytes"
+    visit = Visit(browser, path, "light", 1280, NO_WEBGL)
+    assert visit.page.evaluate("document.body.dataset.ready") == "yes"
+    assert visit.faults == []
+    assert visit.view["figures"] == 3, "the maps need no WebGL"
+    assert visit.page.locator("#rig-3d").is_hidden()
+    stills = visit.page.locator("img.still")
+    assert [still.is_visible() for still in stills.all()] == [True] * 3
+    assert all(stills.evaluate_all("all => all.map((one) => one.naturalWidth > 0)"))
+    assert len(stills.first.screenshot()) > 20_000, "an empty picture packs to a few kilobytes"
 
 
 @pytest.mark.needs_browser
