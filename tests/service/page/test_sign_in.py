@@ -43,6 +43,8 @@ def test_who_has_a_key_comes_in_and_may_what_it_says(
             one.page.wait_for_load_state("networkidle")
             assert one.page.locator("main form:visible").count() == 0
             assert one.page.get_by_role("button", name="Propose targets").count() == 0
+        one.go("Rig")
+        one.see("Trigger box: ready")
         links = one.page.get_by_role("navigation").get_by_role("link").all()
         assert len({link.bounding_box()["y"] for link in links}) == 1  # type: ignore[index]
         one.press("Sign out")
