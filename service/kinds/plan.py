@@ -123,8 +123,7 @@ class PlanResult(Result):
     buildable: Annotated[
         bool,
         Field(
-            description="Whether nothing clashes, no camera leans beyond what the design allows, "
-            "and nothing tips over when it is pushed."
+            description="Whether nothing clashes and no camera leans beyond what the design allows."
         ),
     ]
     clashes: list[PlanClash]

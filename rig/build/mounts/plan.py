@@ -218,8 +218,8 @@ class MountPlan:
 
     @property
     def buildable(self) -> bool:
-        """Whether nothing clashes, no camera leans too far and nothing tips over."""
-        return not self.clashes and not self.leaning and not self.tipping
+        """Whether nothing clashes and no camera leans too far; what tips can be screwed down."""
+        return not self.clashes and not self.leaning
 
     @property
     def tipping(self) -> tuple[Stance, ...]:

@@ -114,7 +114,7 @@ def _verdict(plan: MountPlan) -> str:
         word = "It can be built: nothing collides and all limits of the design hold."
         loss = percent(max(0.0, plan.price.sigma_loss))
         more = f"Settings that exist cost {loss} of the median σ."
-    broken = not plan.buildable or not plan.price.built.feasible
+    broken = not plan.buildable or not plan.price.built.feasible or bool(plan.tipping)
     css = "verdict broken" if broken else "verdict"
     return (
         f'<div class="{css}"><p class="word">{esc(word)}</p><p class="more">{esc(more)}</p></div>'
