@@ -5,14 +5,13 @@ from __future__ import annotations
 import hashlib
 import os
 import re
-import secrets
 import shutil
 import sqlite3
 import tempfile
 import zipfile
 import zlib
 from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -21,7 +20,9 @@ from typing import Annotated, Literal
 from pydantic import AwareDatetime, Field
 
 from common.errors import ConflictError, InputError, RigwrightError
+from common.files.lock import LockHeldError, lock_folder
 from common.files.strict import StrictModel, parsed
+from common.files.writing import neighbour, put_new, with_parents
 from common.version import program_version
 from service.keys import audit, keyfile
 from service.stations import removed
@@ -32,6 +33,7 @@ from service.store.blobs import known_files
 
 SCHEMA = "rigwright.backup/1"
 _ABOUT = "backup.json"
+_PART = ".restore-"
 _TRIES = 3
 _CHUNK_BYTES = 1 << 20
 _BLOB = re.compile(r"blobs/sha256/([0-9a-f]{2})/([0-9a-f]{2})/(\1\2[0-9a-f]{60})")
@@ -80,9 +82,9 @@ def back_up(data: Path, sessions: Path, out: Path) -> Backup:
         raise InputError(
             "no-data", f"the folder {data} has no data of a service", "give its --data"
         )
-    if out.exists():
-        raise ConflictError("backup-exists", f"{out} is there already", "give another name")
-    part = out.with_name(f".{out.name}.{secrets.token_hex(4)}")
+    if os.path.lexists(out):
+        raise _there_already(out)
+    part = neighbour(out)
     try:
         for attempt in range(_TRIES):
             try:
@@ -93,14 +95,25 @@ def back_up(data: Path, sessions: Path, out: Path) -> Backup:
                 part.unlink(missing_ok=True)
                 if attempt == _TRIES - 1:
                     raise
-        part.replace(out)
+        put_new(part, out)
+    except FileExistsError as error:
+        raise _there_already(out) from error
     except OSError as error:
         raise InputError(
             "backup-write", f"{out} cannot be written ({error})", "make room, or give another place"
         ) from error
+    except sqlite3.DatabaseError as error:
+        raise InputError(
+            "no-data", f"the database in {data} cannot be read ({error})", "give a service's --data"
+        ) from error
     finally:
-        part.unlink(missing_ok=True)
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
     return made
+
+
+def _there_already(out: Path) -> ConflictError:
+    return ConflictError("backup-exists", f"{out} is there already", "give another name")
 
 
 def _written(data: Path, sessions: Path, part: Path) -> Backup:
@@ -160,35 +173,96 @@ def _copied(database: Path, copy: Path) -> list[str]:
 def restore(backup: Path, data: Path) -> Backup:
     """Write a backup to the empty folder ``data`` and bring it up to date; all of it is checked.
 
-    Raises :class:`ConflictError` where ``data`` holds something, :class:`InputError` where the
-    backup is not sound; then nothing is left.
+    Until then all of it is in a folder of its own within ``data``, so that nothing of anybody's
+    is ever in the way of a failure. Raises :class:`ConflictError` where ``data`` holds something,
+    or another restore works there, :class:`InputError` where the backup is not sound; then
+    nothing is left.
     """
-    if data.exists() and any(path.name != "lost+found" for path in data.iterdir()):
-        raise ConflictError(
-            "restore-not-empty", f"the folder {data} is not empty", "give a new one with --data"
-        )
-    with _opened(backup) as archive, _emptied_on_failure(data):
+    with _opened(backup) as archive, _claimed(data), _partial(data) as part:
         names = [name for name in archive.namelist() if not name.endswith("/")]
         for name in names:
             if not any(form.fullmatch(name) for form in _NAMES):
                 raise _unsound(backup, f"holds {name!r}")
         parsed(About, archive.read(_ABOUT), f"{backup.name}: {_ABOUT}")
-        # Last of all: before there is a database no service takes the folder for its own.
-        for name in sorted(names, key=lambda name: name == DATABASE_NAME):
-            _extract(archive, name, data, backup)
-        with Store(data, settled_elsewhere=STATION_KINDS) as store:
+        for name in names:
+            _extract(archive, name, part, backup)
+        with Store(part, settled_elsewhere=STATION_KINDS) as store:
             known = store.database.read(known_files)
             missing = [sha256 for sha256 in known if not store.files.path(sha256).is_file()]
         if missing:
             raise _unsound(backup, f"lacks {len(missing)} of its files")
         size = sum(archive.getinfo(name).file_size for name in names)
-        found, away = (_sessions(data / "sessions" / inner) for inner in ("", removed.FOLDER))
-        return Backup(len(known), len(found), size, removed=len(away))
+        found, away = (_sessions(part / "sessions" / inner) for inner in ("", removed.FOLDER))
+        restored = Backup(len(known), len(found), size, removed=len(away))
+        _put_in_place(part, data)
+        return restored
+
+
+@contextmanager
+def _claimed(data: Path) -> Iterator[None]:
+    """An empty folder that no other restore works in; nothing new is left after a failure."""
+    if os.path.lexists(data) and not data.is_dir():
+        raise InputError("restore-failed", f"{data} is no folder", "give a new one with --data")
+    with with_parents(data):
+        try:
+            lock = lock_folder(data)
+        except LockHeldError:
+            raise ConflictError(
+                "restore-not-empty", f"another command works in {data}", "wait for it to end"
+            ) from None
+        try:
+            _require_empty(data)
+            yield
+        finally:
+            lock.release()
+
+
+def _require_empty(data: Path) -> None:
+    held = sorted(path.name for path in data.iterdir() if path.name != "lost+found")
+    if not held:
+        return
+    remedy = "give a new one with --data"
+    if all(re.fullmatch(rf"{re.escape(_PART)}\w+", name) for name in held):
+        remedy = f"a restore was stopped and left {held[0]} there: remove that, or {remedy}"
+    raise ConflictError("restore-not-empty", f"the folder {data} is not empty", remedy)
+
+
+@contextmanager
+def _partial(data: Path) -> Iterator[Path]:
+    part = Path(tempfile.mkdtemp(prefix=_PART, dir=data))
+    try:
+        yield part
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+
+
+def _put_in_place(part: Path, data: Path) -> None:
+    """Move all up into ``data``, or nothing."""
+    # The database last: before there is one no service takes the folder for its own.
+    names = sorted(os.listdir(part), key=lambda name: name == DATABASE_NAME)
+    moved: list[str] = []
+    try:
+        for name in names:
+            if os.path.lexists(data / name):
+                raise ConflictError(
+                    "restore-not-empty",
+                    f"{data / name} appeared while the backup was restored",
+                    "move it away, or give a new folder with --data",
+                )
+            (part / name).rename(data / name)
+            moved.append(name)
+    except BaseException:
+        for name in moved:
+            (data / name).rename(part / name)
+        raise
 
 
 @contextmanager
 def _opened(backup: Path) -> Iterator[zipfile.ZipFile]:
     try:
+        if backup.exists() and not backup.is_file():
+            # Reading a pipe would wait for somebody to write into it.
+            raise _unsound(backup, "is no file")
         with zipfile.ZipFile(backup) as archive:
             if not {_ABOUT, DATABASE_NAME} <= set(archive.namelist()):
                 raise _unsound(backup, "is no backup of this program")
@@ -219,25 +293,6 @@ def _extract(archive: zipfile.ZipFile, name: str, data: Path, backup: Path) -> N
     blob = _BLOB.fullmatch(name)
     if blob and blob[3] != digest.hexdigest():
         raise _unsound(backup, f"is damaged ({name} has other content)")
-
-
-@contextmanager
-def _emptied_on_failure(data: Path) -> Iterator[None]:
-    there = data.exists()
-    data.mkdir(parents=True, exist_ok=True)
-    try:
-        yield
-    except BaseException:
-        for path in data.iterdir():
-            if path.name == "lost+found":
-                continue
-            if path.is_dir():
-                shutil.rmtree(path)
-            else:
-                path.unlink()
-        if not there:
-            data.rmdir()
-        raise
 
 
 def _unsound(backup: Path, why: str) -> InputError:

@@ -1,55 +1,147 @@
-"""Files written whole or not at all."""
+"""Files written whole or not at all, and never over what is somebody else's."""
 
 from __future__ import annotations
 
+import errno
 import os
 import secrets
+import stat
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from common.errors import ConflictError, InputError
 
 LARGEST_BYTES = 200_000_000
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+_NO_LINKS = (errno.EPERM, errno.EOPNOTSUPP, errno.ENOSYS, errno.EMLINK)
 
 
 def write_whole(path: Path, data: bytes, overwrite: bool = False, *, private: bool = False) -> None:
     """Writes to a neighbour, then renames; what is replaced keeps its permissions.
 
-    A ``private`` file is at no moment open to anybody but its owner.
+    A link stays, and the file it leads to is replaced. Without ``overwrite`` nothing is replaced,
+    what appears meanwhile included. A ``private`` file is at no moment open to anybody but its
+    owner.
 
     Raises :class:`ConflictError` when the file is there, :class:`InputError` when it cannot be
     written.
     """
-    if path.exists() and not overwrite:
-        raise ConflictError(
-            "file-exists", f"{path.name} exists already", "give another name, or allow overwriting"
-        )
-    part = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
+    place = writable_place(path, overwrite=overwrite)
+    part = neighbour(place)
     try:
         with open(part, "wb", opener=_private if private else None) as file:
             file.write(data)
             file.flush()
             # Renamed first and written later, a file would be empty after a loss of power.
             os.fsync(file.fileno())
-        if path.exists() and not private:
-            part.chmod(path.stat().st_mode & 0o7777)
-        part.replace(path)
+        if overwrite:
+            if place.exists() and not private:
+                part.chmod(place.stat().st_mode & 0o7777)
+            part.replace(place)
+        else:
+            put_new(part, place)
+    except FileExistsError:
+        raise _taken(path) from None
     except OSError as error:
-        part.unlink(missing_ok=True)
+        raise _unwritable(path, error) from error
+    finally:
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
+
+
+def writable_place(path: Path, *, overwrite: bool) -> Path:
+    """Where a file written to ``path`` ends up: ``path`` itself, or where its link leads.
+
+    Raises :class:`ConflictError` where something is there and ``overwrite`` is not asked for,
+    :class:`InputError` where that is no plain file, or the link leads to nothing.
+    """
+    if not os.path.lexists(path):
+        return path
+    if not overwrite:
+        raise _taken(path)
+    try:
+        place = path.resolve(strict=True)
+        plain = stat.S_ISREG(place.stat().st_mode)
+    except (OSError, RuntimeError) as error:
         raise InputError(
-            "file-write",
-            f"{path.name} cannot be written ({(error.strerror or 'unwritable').lower()})",
-            "make its folder writable, or give another",
+            "file-write", f"{path} is a link that leads to no file", "mend it or remove it"
         ) from error
+    if not plain:
+        raise InputError("file-write", f"{path} is no plain file", "give another name")
+    return place
+
+
+def neighbour(place: Path) -> Path:
+    """A free name in the folder of ``place``, for a file on its way there; never too long."""
+    return place.with_name(f".rigwright-{secrets.token_hex(8)}")
+
+
+def put_new(part: Path, place: Path) -> None:
+    """Give a whole file its name; raises :class:`FileExistsError` where that is taken by now."""
+    try:
+        os.link(part, place, follow_symlinks=False)
+    except OSError as error:
+        if error.errno not in _NO_LINKS:
+            raise
+        # A file system without hard links: the name is taken first, and only then replaced.
+        place.open("xb").close()
+        part.replace(place)
+        return
+    part.unlink()
+
+
+@contextmanager
+def with_parents(folder: Path) -> Iterator[None]:
+    """``folder`` and those above it are made; what was made goes again when something fails.
+
+    What has been put into them meanwhile stays, and they with it. Raises :class:`OSError`.
+    """
+    made = [above for above in (folder, *folder.parents) if not os.path.lexists(above)]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        yield
+    except BaseException:
+        _remove_empty(made)
+        raise
+
+
+def _remove_empty(folders: Iterable[Path]) -> None:
+    for folder in folders:
+        with suppress(OSError):
+            folder.rmdir()
 
 
 def _private(path: str, flags: int) -> int:
     return os.open(path, flags, 0o600)
 
 
+def _taken(path: Path) -> ConflictError:
+    return ConflictError(
+        "file-exists", f"{path.name} exists already", "give another name, or allow overwriting"
+    )
+
+
+def _unwritable(path: Path, error: OSError) -> InputError:
+    remedy = "make its folder writable, or give another"
+    if error.errno in _FULL:
+        remedy = "free some space, or give another folder"
+    if error.errno == errno.ENAMETOOLONG:
+        remedy = "give a shorter name"
+    if error.errno in (errno.ENOENT, errno.ENOTDIR):
+        remedy = "give a name in a folder that is there"
+    why = (error.strerror or "unwritable").lower()
+    return InputError("file-write", f"{path.name} cannot be written ({why})", remedy)
+
+
 def read_limited(path: Path) -> bytes:
     """A file's bytes; raises :class:`InputError` when it is missing or far too large."""
     try:
-        if path.stat().st_size > LARGEST_BYTES:
+        found = path.stat()
+        if not (stat.S_ISREG(found.st_mode) or stat.S_ISDIR(found.st_mode)):
+            # Reading a pipe would wait for somebody to write into it.
+            raise InputError("file-read", f"{path.name} is no plain file", "check the path")
+        if found.st_size > LARGEST_BYTES:
             raise InputError(
                 "file-too-large",
                 f"{path.name} has more than {LARGEST_BYTES // 1_000_000} MB",

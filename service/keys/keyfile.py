@@ -66,7 +66,7 @@ def read_keys(folder: Path) -> list[Key]:
     Raises :class:`InputError` for a file that is not sound.
     """
     path = folder / FILE_NAME
-    if not path.exists():
+    if not path.exists() and not path.is_symlink():
         return []
     return parsed(_KeyFile, read_limited(path), FILE_NAME).keys
 

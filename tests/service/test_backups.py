@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sqlite3
 import zipfile
 from datetime import timedelta
@@ -145,8 +146,84 @@ def test_an_unsound_backup_leaves_nothing(tmp_path: Path, backup: Path, fault: s
                 new.writestr(strange[fault], "x")
     before = files_under(tmp_path)
     with pytest.raises(InputError):
-        restore(bad, tmp_path / "new")
-    assert files_under(tmp_path) == before and not (tmp_path / "new").exists()
+        restore(bad, tmp_path / "p" / "q" / "new")
+    assert files_under(tmp_path) == before and not (tmp_path / "p").exists()
+
+
+def test_a_backup_does_not_replace_what_appears_meanwhile(
+    tmp_path: Path, backup: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out, data, sync = tmp_path / "out.zip", tmp_path / "data", os.fsync
+
+    def meanwhile(handle: int) -> None:
+        sync(handle)
+        out.write_text("mine")
+
+    out.symlink_to("nowhere")
+    with pytest.raises(ConflictError, match="there already"):
+        back_up(data, data / "sessions", out)
+    assert out.is_symlink()
+    out.unlink()
+    monkeypatch.setattr(os, "fsync", meanwhile)
+    with pytest.raises(ConflictError, match="there already"):
+        back_up(data, data / "sessions", out)
+    assert out.read_text() == "mine" and backup.is_file()
+    assert sorted(os.listdir(tmp_path)) == ["b.zip", "data", "out.zip"]
+
+
+def test_a_second_restore_and_what_is_put_there_meanwhile_stay_apart(
+    tmp_path: Path, backup: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    new, seen = tmp_path / "new", []
+
+    class Meanwhile(Store):
+        def close(self) -> None:
+            super().close()
+            with pytest.raises(ConflictError, match="another command works"):
+                restore(backup, new)
+            (new / "mine.txt").write_text("mine")
+            if seen:
+                (new / "blobs").mkdir()
+            seen.append(files_under(new))
+
+    monkeypatch.setattr("service.backups.Store", Meanwhile)
+    restore(backup, new)
+    assert (new / "mine.txt").read_text() == "mine"
+    with Store(new) as store:
+        assert len(known(store)[1]) == 1
+    new = tmp_path / "other"
+    with pytest.raises(ConflictError, match="blobs appeared while"):
+        restore(backup, new)
+    assert sorted(os.listdir(new)) == ["blobs", "mine.txt"]
+
+
+def test_the_remains_of_a_stopped_restore_are_told(tmp_path: Path, backup: Path) -> None:
+    (tmp_path / "new" / ".restore-ab12cd").mkdir(parents=True)
+    with pytest.raises(ConflictError, match="a restore was stopped and left"):
+        restore(backup, tmp_path / "new")
+    # A disk of its own has this folder from the beginning.
+    (tmp_path / "new" / ".restore-ab12cd").rename(tmp_path / "new" / "lost+found")
+    restore(backup, tmp_path / "new")
+    assert {"lost+found", DATABASE_NAME} < set(os.listdir(tmp_path / "new"))
+
+
+def test_places_that_cannot_be_are_told_in_a_line(tmp_path: Path, backup: Path) -> None:
+    (tmp_path / "file").write_text("mine")
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(InputError, match="is no folder"):
+        restore(backup, tmp_path / "file")
+    with pytest.raises(InputError, match="is no file"):
+        restore(tmp_path / "pipe", tmp_path / "new")
+    for bad in (tmp_path / ("n" * 300), tmp_path / "file" / "new"):
+        with pytest.raises(InputError):
+            restore(backup, bad)
+        with pytest.raises(InputError):
+            back_up(tmp_path / "data", tmp_path / "none", bad)
+    (tmp_path / "junk").mkdir()
+    (tmp_path / "junk" / DATABASE_NAME).write_bytes(b"this is not a database" * 100)
+    with pytest.raises(InputError, match="cannot be read"):
+        back_up(tmp_path / "junk", tmp_path / "none", tmp_path / "out.zip")
+    assert not (tmp_path / "out.zip").exists() and not (tmp_path / "new").exists()
 
 
 @pytest.mark.parametrize("revision", ["0001", "0002"])

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 import socket
 import tty
 from collections.abc import Callable
@@ -86,11 +87,9 @@ class PtyEndpoint:
         """The terminal hangs up and its link vanishes."""
         if self._master < 0:
             return
-        if self._link:
+        if self._link and _leads_to(self._link) == self._path:
             self._link.unlink(missing_ok=True)
-        os.close(self._master)
-        os.close(self._slave)
-        self._master = self._slave = -1
+        self._hang_up()
 
     def replug(self) -> None:
         """A new terminal, under the old link."""
@@ -102,19 +101,50 @@ class PtyEndpoint:
         os.set_blocking(self._master, False)
         self._path = os.ttyname(self._slave)
         if self._link:
-            self._place_link(self._link)
+            try:
+                self._place_link(self._link)
+            except BaseException:
+                self._hang_up()
+                raise
+
+    def _hang_up(self) -> None:
+        os.close(self._master)
+        os.close(self._slave)
+        self._master = self._slave = -1
 
     def _place_link(self, link: Path) -> None:
-        if link.exists() and not link.is_symlink():
+        former = _leads_to(link)
+        try:
+            # A box that was killed left its link; any other is somebody's.
+            if former is not None and _is_terminal(former, self._path):
+                link.unlink(missing_ok=True)
+            link.symlink_to(self._path)
+        except FileExistsError as error:
             raise InputError(
                 "fake-link",
-                f"{link} exists and is no symbolic link",
+                f"{link} is there already, and is no link of a fake box",
                 "name a path that is free",
-            )
-        draft = link.with_name(f".{link.name}.{os.getpid()}")
-        draft.unlink(missing_ok=True)
-        draft.symlink_to(self._path)
-        draft.replace(link)
+            ) from error
+        except OSError as error:
+            raise InputError(
+                "fake-link",
+                f"the link {link} cannot be made ({(error.strerror or 'unwritable').lower()})",
+                "name another path, in a folder that is there",
+            ) from error
+
+
+def _leads_to(link: Path) -> str | None:
+    """The text of a symbolic link; None for what is none."""
+    try:
+        return os.readlink(link)
+    except OSError:
+        return None
+
+
+def _is_terminal(path: str, like: str) -> bool:
+    """Whether ``path`` names a pseudo-terminal, gone or not, as ``like`` does."""
+    before_number = re.escape(like.rstrip("0123456789"))
+    return re.fullmatch(rf"{before_number}\d+", path) is not None
 
 
 class TcpEndpoint:

@@ -50,20 +50,21 @@ def keys_add(
     with one_line_errors():
         folder = _folder(data)
         from common.errors import InputError
+        from common.files.writing import with_parents
         from service.keys.keyfile import add_key
         from service.keys.scope import Scope
         from service.store import refuse_foreign
 
         try:
-            folder.mkdir(parents=True, exist_ok=True)
-            refuse_foreign(folder)
+            with with_parents(folder):
+                refuse_foreign(folder)
+                key, token = add_key(folder, name, Scope(scope), expires)
         except OSError as error:
             raise InputError(
                 "data-folder",
                 f"the data folder {folder} cannot be used ({error.strerror})",
                 "give a folder you may write to with --data",
             ) from error
-        key, token = add_key(folder, name, Scope(scope), expires)
         if as_json:
             print_json({**_told(key), "key": token})
             return

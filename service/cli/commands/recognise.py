@@ -203,7 +203,7 @@ def _new_gallery(path: Path, *, overwrite: bool) -> Iterator[Path]:
     import tempfile
 
     from common.errors import ConflictError, InputError
-    from common.files.writing import write_whole
+    from common.files.writing import writable_place, write_whole
     from evaluation.recognition.galleryfile import read_gallery
 
     if path.is_dir() or not path.parent.is_dir():
@@ -214,6 +214,7 @@ def _new_gallery(path: Path, *, overwrite: bool) -> Iterator[Path]:
             raise ConflictError("file-exists", f"{path} is there already", "give --force")
         # What is no gallery is not replaced, whatever was said.
         read_gallery(path)
+    writable_place(path, overwrite=overwrite)
     with tempfile.TemporaryDirectory(prefix="rigwright-") as temporary:
         yield Path(temporary)
         data = (Path(temporary) / "gallery.npz").read_bytes()

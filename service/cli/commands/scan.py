@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -71,7 +72,7 @@ def _refuse_what_is_there(picture: Path | None) -> None:
     """Before the scan is read: a picture replaces no file, least of all the scan itself."""
     from common.errors import ConflictError
 
-    if picture is not None and picture.exists():
+    if picture is not None and os.path.lexists(picture):
         raise ConflictError(
             "file-exists", f"{picture} is there already", "give another name for the picture"
         )

@@ -1,0 +1,109 @@
+"""Files written whole: links stay, and nothing that is somebody else's is replaced."""
+
+from __future__ import annotations
+
+import errno
+import os
+from pathlib import Path
+
+import pytest
+
+from common.errors import ConflictError, InputError
+from common.files.writing import neighbour, put_new, read_limited, with_parents, write_whole
+
+
+def test_a_link_stays_and_the_file_it_leads_to_is_replaced(tmp_path: Path) -> None:
+    (tmp_path / "elsewhere").mkdir()
+    real = tmp_path / "elsewhere" / "station.toml"
+    real.write_text("old")
+    real.chmod(0o640)
+    link = tmp_path / "station.toml"
+    link.symlink_to(real)
+    write_whole(link, b"new", overwrite=True)
+    assert link.is_symlink() and real.read_text() == "new" and real.stat().st_mode & 0o777 == 0o640
+    assert os.listdir(tmp_path / "elsewhere") == ["station.toml"]
+
+
+@pytest.mark.parametrize("overwrite", [False, True])
+@pytest.mark.parametrize("kind", ["dangling", "loop", "folder", "pipe"])
+def test_what_is_no_file_is_refused_and_stays(tmp_path: Path, kind: str, overwrite: bool) -> None:
+    path = tmp_path / "out"
+    if kind == "folder":
+        path.mkdir()
+    elif kind == "pipe":
+        os.mkfifo(path)
+    else:
+        path.symlink_to(tmp_path / ("gone" if kind == "dangling" else "out"))
+    before = path.lstat()
+    with pytest.raises(InputError if overwrite else ConflictError):
+        write_whole(path, b"x", overwrite)
+    assert os.listdir(tmp_path) == ["out"] and path.lstat().st_ino == before.st_ino
+
+
+@pytest.mark.parametrize("links", [True, False])
+def test_what_appears_meanwhile_is_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, links: bool
+) -> None:
+    def none(*_: object, **__: object) -> None:
+        raise OSError(errno.EPERM, "no hard links here")
+
+    if not links:
+        monkeypatch.setattr(os, "link", none)
+    write_whole(tmp_path / "free", b"whole")
+    assert (tmp_path / "free").read_bytes() == b"whole"
+    sync = os.fsync
+
+    def meanwhile(handle: int) -> None:
+        sync(handle)
+        (tmp_path / "out").write_text("theirs")
+
+    monkeypatch.setattr(os, "fsync", meanwhile)
+    with pytest.raises(ConflictError, match="out exists already"):
+        write_whole(tmp_path / "out", b"ours")
+    assert (tmp_path / "out").read_text() == "theirs"
+    assert sorted(os.listdir(tmp_path)) == ["free", "out"]
+    (tmp_path / "dangling").symlink_to("nowhere")
+    part = neighbour(tmp_path / "out")
+    part.write_text("ours")
+    with pytest.raises(FileExistsError):
+        put_new(part, tmp_path / "dangling")
+    assert (tmp_path / "dangling").is_symlink()
+
+
+@pytest.mark.parametrize(
+    ("name", "remedy"), [("n" * 300, "a shorter name"), ("no/folder/x", "a folder that is there")]
+)
+def test_a_name_that_cannot_be_is_told(tmp_path: Path, name: str, remedy: str) -> None:
+    for overwrite in (False, True):
+        with pytest.raises(InputError, match=remedy):
+            write_whole(tmp_path / name, b"x", overwrite)
+    # As long as the disk allows is not too long.
+    write_whole(tmp_path / ("n" * 255), b"x")
+
+
+def test_a_full_disk_is_told_as_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(_: int) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(InputError, match="free some space"):
+        write_whole(tmp_path / "x", b"x")
+    assert os.listdir(tmp_path) == []
+
+
+def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "keys.json")
+    with pytest.raises(InputError, match="is no plain file"):
+        read_limited(tmp_path / "keys.json")
+
+
+def test_folders_made_for_nothing_go_again_and_only_those(tmp_path: Path) -> None:
+    (tmp_path / "there").mkdir()
+    for put, left in ((None, ["there"]), ("note", ["a", "a/b", "a/note", "there"])):
+        with pytest.raises(ZeroDivisionError), with_parents(tmp_path / "a" / "b"):  # noqa: PT012
+            if put is not None:
+                (tmp_path / "a" / put).write_text("mine")
+                (tmp_path / "a" / "b" / put).write_text("mine")
+            raise ZeroDivisionError
+        found = sorted(p.relative_to(tmp_path).as_posix() for p in tmp_path.rglob("*"))
+        assert found == (left if put is None else sorted([*left, "a/b/note"]))
