@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import secrets
 import shutil
 
 from anyio import to_thread
@@ -73,7 +72,7 @@ def read_apart(
 
     The file is the task's input ``upload``, called ``name``. Raises what the task raises.
     """
-    folder = service.store.work_folder(f"import-{secrets.token_hex(8)}")
+    folder = service.store.import_folder()
     link = folder / "inputs" / name
     try:
         for path in (folder / "files", link.parent):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import secrets
 import shutil
 import uuid
 from collections.abc import Collection
@@ -16,20 +18,22 @@ from sqlalchemy.exc import DatabaseError
 from common.closing import Closing
 from common.errors import InputError, InternalError
 from service.ipc import error_fields
+from service.logs import log
 from service.store import idempotency
 from service.store.blobs import Blobs, known_files
 from service.store.database import Database
 from service.store.documents import Documents
 from service.store.jobs import Jobs
 from service.store.lock import FolderLock
+from service.store.ours import DATABASE_NAME, refuse_foreign
 from service.store.scans import Scans
 from service.store.signins import SignIns
-from service.store.tables import identity, utc_now
+from service.store.tables import identity, jobs, utc_now
 
-DATABASE_NAME = "rigwright.sqlite3"
-_BEFORE_THE_DATABASE = {"lock", "lost+found", "keys.json"}
-"""A start that was cut short left a lock; a disk of its own has a folder for what is found; keys
-are made before a service starts that others can reach."""
+__all__ = ["DATABASE_NAME", "Store", "interrupted", "refuse_foreign"]
+
+_IMPORT = re.compile(r"import-[0-9a-f]{16}")
+"""Folders in which uploads are read (:meth:`Store.import_folder`)."""
 
 
 def interrupted() -> InternalError:
@@ -55,11 +59,7 @@ class Store(Closing):
             refuse_foreign(folder)
             self._lock = FolderLock(folder)
         except OSError as error:
-            raise InputError(
-                "data-folder",
-                f"the data folder {folder} cannot be used ({error.strerror})",
-                "give a folder you may write to with --data",
-            ) from error
+            raise _unusable(folder, error) from error
         self.database = Database(folder / DATABASE_NAME)
         try:
             self.database.write(_migrate)
@@ -70,21 +70,30 @@ class Store(Closing):
                 f"the database in {folder} is damaged or of a newer version of this program",
                 "use the newer version, or another folder with --data",
             ) from error
-        self.files = Blobs(folder)
+        try:
+            self.files = Blobs(folder)
+            self._work = folder / "work"
+            self._work.mkdir(exist_ok=True)
+        except OSError as error:
+            self.close()
+            raise _unusable(folder, error) from error
         self.scans = Scans(self.database, self.files)
         self.documents = Documents(self.database, self.files)
         self.jobs = Jobs(self.database, self.files)
         self.sign_ins = SignIns(self.database)
         self.service_uuid = self.database.write(_identify)
-        self._work = folder / "work"
         self._recover(settled_elsewhere)
 
-    def work_folder(self, name: str) -> Path:
-        """A fresh folder for work in progress; removed when the store is next opened."""
-        folder = self._work / name
+    def work_folder(self, job_id: str) -> Path:
+        """A fresh folder for a job at work; removed when the store is next opened."""
+        folder = self._work / job_id
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir(parents=True)
         return folder
+
+    def import_folder(self) -> Path:
+        """A fresh folder to read an upload in; removed when the store is next opened."""
+        return self.work_folder(f"import-{secrets.token_hex(8)}")
 
     def close(self) -> None:
         """Finish writing and let go of the folder."""
@@ -92,24 +101,37 @@ class Store(Closing):
         self._lock.release()
 
     def _recover(self, settled_elsewhere: Collection[str]) -> None:
-        shutil.rmtree(self._work, ignore_errors=True)
+        kept = self._sweep_work()
         self.database.write(idempotency.forget_stale)
         self.jobs.interrupt_running(error_fields(interrupted()), but=settled_elsewhere)
-        self.files.sweep(self.database.read(known_files))
+        kept += self.files.sweep(self.database.read(known_files))
+        if kept:
+            fields = {"folder": str(self.folder), "files": sorted(path.name for path in kept)[:20]}
+            log.warning(
+                "files of others in the data folder are left alone", extra={"fields": fields}
+            )
+
+    def _sweep_work(self) -> list[Path]:
+        """Remove the folders of jobs and uploads that a crash has left; what else is there."""
+        if self._work.is_symlink():
+            return [self._work]
+        known = self.database.read(lambda c: set(c.scalars(select(jobs.c.id))))
+        kept = []
+        for path in self._work.iterdir():
+            ours = path.name in known or _IMPORT.fullmatch(path.name)
+            if ours and path.is_dir() and not path.is_symlink():
+                shutil.rmtree(path, ignore_errors=True)
+            else:
+                kept.append(path)
+        return kept
 
 
-def refuse_foreign(folder: Path) -> None:
-    """Keep away from folders with anybody's files: some names below are emptied at each start.
-
-    Raises :class:`InputError` where ``folder`` holds any.
-    """
-    names = {path.name for path in folder.iterdir()} - _BEFORE_THE_DATABASE
-    if names and not (folder / DATABASE_NAME).is_file():
-        raise InputError(
-            "data-folder",
-            f"the folder {folder} holds other files ({min(names)}), and no data of this program",
-            "give a new folder with --data",
-        )
+def _unusable(folder: Path, error: OSError) -> InputError:
+    return InputError(
+        "data-folder",
+        f"the data folder {folder} cannot be used ({error.strerror})",
+        "give a folder you may write to with --data",
+    )
 
 
 def _migrate(connection: Connection) -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 import secrets
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -22,6 +23,8 @@ from common.closing import Closing
 from service.store.tables import blobs, documents, job_files, job_inputs, scans, utc_now
 
 _CHUNK_BYTES = 1 << 20
+_STAGED = re.compile(r"[0-9a-f]{32}(\.\w+)*")
+_HASH = re.compile(r"[0-9a-f]{64}")
 _REFERRING = (scans, documents, job_inputs, job_files)
 
 
@@ -116,16 +119,46 @@ class Blobs:
         for sha256 in hashes:
             self.path(sha256).unlink(missing_ok=True)
 
-    def sweep(self, known: set[str]) -> None:
-        """Remove what a crash has left: unfinished files, and files without a row."""
-        for path in self._staging.iterdir():
-            path.unlink()
-        for path in self._files():
-            if path.name not in known:
+    def sweep(self, known: set[str]) -> list[Path]:
+        """Remove what a crash has left: unfinished files, and files without a row.
+
+        Only under names that this class gives, and never through a link. Returns what else is
+        there: it is somebody's.
+        """
+        kept = []
+        for path in _entries(self._staging):
+            if _STAGED.fullmatch(path.name) and _plain(path):
                 path.unlink()
+            else:
+                kept.append(path)
+        for path in self._files():
+            if not _ours(path) or not _plain(path):
+                kept.append(path)
+            elif path.name not in known:
+                path.unlink()
+        return kept
 
     def _files(self) -> Iterator[Path]:
-        return self._root.glob("??/??/*")
+        if self._root.parent.is_symlink():
+            return
+        for outer in _entries(self._root):
+            for inner in _entries(outer):
+                yield from _entries(inner)
+
+
+def _entries(folder: Path) -> list[Path]:
+    """What is in a folder; nothing where that is none, or a link to one."""
+    return list(folder.iterdir()) if folder.is_dir() and not folder.is_symlink() else []
+
+
+def _plain(path: Path) -> bool:
+    return path.is_file() and not path.is_symlink()
+
+
+def _ours(path: Path) -> bool:
+    """Whether a file lies where :meth:`Blobs.path` puts it."""
+    name, folders = path.name, (path.parent.parent.name, path.parent.name)
+    return _HASH.fullmatch(name) is not None and folders == (name[:2], name[2:4])
 
 
 def known_files(connection: Connection) -> set[str]:

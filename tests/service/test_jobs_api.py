@@ -224,7 +224,7 @@ class TestDurability:
                     lambda client=client, running=running: client.get(running).json()["progress"]
                 )
                 killed.append(running)
-                (data / "tmp" / "half.ply").write_bytes(b"half an upload")
+                (data / "tmp" / f"{'ab' * 16}.ply").write_bytes(b"half an upload")
             server.kill()
         with start_server(data).client() as client:
             assert len(client.get("/v1/counts").json()["items"]) == len(done) + len(killed)
