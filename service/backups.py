@@ -239,7 +239,7 @@ def _partial(data: Path) -> Iterator[Path]:
 def _put_in_place(part: Path, data: Path) -> None:
     """Move all up into ``data``, or nothing."""
     # The database last: before there is one no service takes the folder for its own.
-    names = sorted(os.listdir(part), key=lambda name: name == DATABASE_NAME)
+    names = sorted((p.name for p in part.iterdir()), key=lambda name: name == DATABASE_NAME)
     moved: list[str] = []
     try:
         for name in names:

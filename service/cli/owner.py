@@ -155,7 +155,7 @@ class OwnRig:
         try:
             return Session.open(folder)
         except NotFoundError:
-            if folder.exists():
+            if folder.exists() and not (folder.is_dir() and not any(folder.iterdir())):
                 raise
             return self._rig.new_session(folder, subject, operator)
 

@@ -28,6 +28,10 @@ from service.store.jobrecords import NewJob
 from service.store.scans import scan_identity
 
 
+def names_in(folder: Path) -> list[str]:
+    return [path.name for path in folder.iterdir()]
+
+
 def filled(data: Path) -> Store:
     """A store with a scan and a job, and a key beside it."""
     store = Store(data)
@@ -168,7 +172,7 @@ def test_a_backup_does_not_replace_what_appears_meanwhile(
     with pytest.raises(ConflictError, match="there already"):
         back_up(data, data / "sessions", out)
     assert out.read_text() == "mine" and backup.is_file()
-    assert sorted(os.listdir(tmp_path)) == ["b.zip", "data", "out.zip"]
+    assert sorted(names_in(tmp_path)) == ["b.zip", "data", "out.zip"]
 
 
 def test_a_second_restore_and_what_is_put_there_meanwhile_stay_apart(
@@ -194,7 +198,7 @@ def test_a_second_restore_and_what_is_put_there_meanwhile_stay_apart(
     new = tmp_path / "other"
     with pytest.raises(ConflictError, match="blobs appeared while"):
         restore(backup, new)
-    assert sorted(os.listdir(new)) == ["blobs", "mine.txt"]
+    assert sorted(names_in(new)) == ["blobs", "mine.txt"]
 
 
 def test_the_remains_of_a_stopped_restore_are_told(tmp_path: Path, backup: Path) -> None:
@@ -204,7 +208,7 @@ def test_the_remains_of_a_stopped_restore_are_told(tmp_path: Path, backup: Path)
     # A disk of its own has this folder from the beginning.
     (tmp_path / "new" / ".restore-ab12cd").rename(tmp_path / "new" / "lost+found")
     restore(backup, tmp_path / "new")
-    assert {"lost+found", DATABASE_NAME} < set(os.listdir(tmp_path / "new"))
+    assert {"lost+found", DATABASE_NAME} < set(names_in(tmp_path / "new"))
 
 
 def test_places_that_cannot_be_are_told_in_a_line(tmp_path: Path, backup: Path) -> None:

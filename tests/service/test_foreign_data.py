@@ -16,6 +16,10 @@ from service.cli.commands.check import _earlier
 from service.store import DATABASE_NAME, Store
 
 
+def names_in(folder: Path) -> list[str]:
+    return [path.name for path in folder.iterdir()]
+
+
 def test_a_data_folder_with_other_files_is_left_alone(tmp_path: Path) -> None:
     (tmp_path / "work").mkdir()
     (tmp_path / "work" / "thesis.tex").write_text("mine")
@@ -112,7 +116,7 @@ def test_a_forged_database_is_refused_and_nothing_changes(tmp_path: Path, kind: 
     before = content(data)
     with pytest.raises(InputError):
         Store(data)
-    assert content(data) == before and sorted(os.listdir(tmp_path)) == ["data"]
+    assert content(data) == before and sorted(names_in(tmp_path)) == ["data"]
 
 
 def test_a_first_start_that_was_cut_short_is_begun_again(tmp_path: Path) -> None:
@@ -146,10 +150,10 @@ def test_a_lock_of_others_is_left_alone(tmp_path: Path, kind: str, real: bool) -
         os.mkfifo(lock)
     else:
         lock.write_text("mine" if kind == "text" else "1" * 1000)
-    before = sorted(os.listdir(data))
+    before = sorted(names_in(data))
     with pytest.raises(InputError, match="lock"):
         Store(data)
-    assert sorted(os.listdir(data)) == before and sorted(os.listdir(tmp_path)) == ["data"]
+    assert sorted(names_in(data)) == before and sorted(names_in(tmp_path)) == ["data"]
     if kind in ("text", "large"):
         assert lock.read_text() in ("mine", "1" * 1000)
 

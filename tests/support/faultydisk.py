@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 from rig.acquisition.session.storage import Disk
@@ -74,6 +75,15 @@ class FaultyDisk(Disk):
     def sync_folder(self, folder: Path) -> None:  # noqa: ARG002  as for write
         if self._fails():
             raise self._refuse()
+
+    def sweep(self, folder: Path, ours: Callable[[str], object]) -> None:
+        if self._fails():
+            inside = sorted(p for p in folder.rglob("*") if p.is_file()) if folder.is_dir() else []
+            for path in inside[: len(inside) // 2]:
+                if ours(path.relative_to(folder).as_posix()):
+                    path.unlink()
+            raise self._refuse()
+        super().sweep(folder, ours)
 
     def remove(self, folder: Path) -> None:
         if self._fails():

@@ -7,6 +7,7 @@ session. The one moment that counts is the replacing of ``session.json``.
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from rig.acquisition.session.records import (
     InterruptedEntry,
     SessionFile,
 )
+from rig.acquisition.session.storage import file_sha256, sha256
 from rig.acquisition.session.tables import joined, rows_of
 
 
@@ -57,6 +59,7 @@ def write_index(index: SessionIndex) -> SessionIndex:
     listed = []
     made = (*index.rows, *map(rows_of, index.records[len(index.rows) :]))
     for path, data in joined(made).items():
+        _keep_changed(index, path, data)
         index.disk.replace(index.folder / path, data, index.scratch)
         listed.append(entry(path, data))
     manifest = signed(index.manifest.model_copy(update={"tables": listed}))
@@ -76,10 +79,31 @@ def _put_in_place(index: SessionIndex, record: CaptureRecord, stage: Path) -> No
         source, target = stage / frame.file.path, index.folder / frame.file.path
         if source.exists():
             index.disk.make_folder(target.parent)
+            keep_aside(index, target)
             index.disk.move(source, target)
         folders.add(target.parent)
     for folder in sorted(folders):
         index.disk.sync_folder(folder)
+
+
+def _keep_changed(index: SessionIndex, path: str, data: bytes) -> None:
+    """Somebody may have worked in a table: what was not written here is not written over."""
+    written = {entry.sha256 for entry in index.manifest.tables if entry.path == path}
+    place = index.folder / path
+    if place.is_symlink() or (
+        place.is_file() and file_sha256(place) not in written | {sha256(data)}
+    ):
+        keep_aside(index, place)
+
+
+def keep_aside(index: SessionIndex, place: Path) -> None:
+    """Free a name that somebody's file has; it stays beside, as ``.changed``."""
+    if not os.path.lexists(place):
+        return
+    aside = place.with_name(f"{place.name}{paths.CHANGED}")
+    while os.path.lexists(aside):
+        aside = aside.with_name(f"{aside.name}{paths.CHANGED}")
+    index.disk.move(place, aside)
 
 
 def set_aside(index: SessionIndex, aside: InterruptedEntry) -> SessionIndex:
@@ -103,9 +127,9 @@ def set_aside(index: SessionIndex, aside: InterruptedEntry) -> SessionIndex:
 
 
 def clear_stage(index: SessionIndex, stage: Path) -> None:
-    """Remove a stage, and the folder of stages when it was the last."""
-    index.disk.remove(stage)
-    index.disk.remove(index.scratch)
+    """Remove what was written in a stage, and the folder of stages when it was the last."""
+    index.disk.sweep(stage, paths.STAGED.fullmatch)
+    index.disk.sweep(index.scratch, paths.HALF.fullmatch)
     left = index.folder / paths.INCOMPLETE
     if left.is_dir() and not any(left.iterdir()):
-        index.disk.remove(left)
+        index.disk.sweep(left, paths.HALF.fullmatch)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-import glob
+import os
 import re
 import secrets
 import unicodedata
@@ -25,7 +25,7 @@ from rig.acquisition.session.records import CaptureRecord, InterruptedEntry, Ses
 from rig.acquisition.session.recovery import Recovery, recover_index
 from rig.acquisition.session.storage import Disk, disk_errors
 
-CAPTURE_ID = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
+CAPTURE_ID = paths.CAPTURE_ID
 MEGABYTE = 1e6
 
 
@@ -62,7 +62,7 @@ class Session(Closing):
         with disk_errors(folder.parent):
             _require_new(folder)
             disk.make_folder(folder.parent)
-            _remove_stale(folder, disk)
+            _remove_stale(folder, plan, disk)
             disk.make_folder(half)
             # The lock is on the folder itself and stays with it when it is renamed.
             lock = _locked(half)
@@ -173,13 +173,30 @@ def session_folder(root: Path, subject: str, now: datetime | None = None) -> Pat
     return root / f"sub-{name}" / f"ses-{now:%Y%m%dT%H%M%S}"
 
 
-def _remove_stale(folder: Path, disk: Disk) -> None:
-    """Remove beginnings of this session that a crash left; those being made are locked."""
-    for half in folder.parent.glob(f".{glob.escape(folder.name)}.*.part"):
+def _remove_stale(folder: Path, plan: SessionPlan, disk: Disk) -> None:
+    """Remove beginnings of this session that a crash left; those being made are locked.
+
+    Only what a beginning is made of goes; with anything else in it, all stays.
+    """
+    ours = {paths.SESSION, *paths.TABLES, *plan.rig_files}
+    scratch = f"{paths.SCRATCH}/"
+
+    def begun(name: str) -> bool:
+        half = name.startswith(scratch) and paths.HALF.fullmatch(name.removeprefix(scratch))
+        return name in ours or bool(half)
+
+    form = re.compile(rf"\.{re.escape(folder.name)}\.[0-9a-f]{{8}}\.part")
+    for half in folder.parent.iterdir():
+        if not form.fullmatch(half.name) or half.is_symlink():
+            continue
         with contextlib.suppress(ConflictError, NotFoundError):
             lock = _locked(half)
-            disk.remove(half)
-            lock.release()
+            try:
+                files = (p for p in half.rglob("*") if p.is_symlink() or not p.is_dir())
+                if all(begun(path.relative_to(half).as_posix()) for path in files):
+                    disk.sweep(half, begun)
+            finally:
+                lock.release()
 
 
 def _begin(half: Path, plan: SessionPlan, disk: Disk) -> SessionIndex:
@@ -208,7 +225,9 @@ def _begin(half: Path, plan: SessionPlan, disk: Disk) -> SessionIndex:
 
 
 def _require_new(folder: Path) -> None:
-    if folder.exists() or folder.is_symlink():
+    # An empty folder is one that somebody made for the session.
+    empty = folder.is_dir() and not folder.is_symlink() and not any(folder.iterdir())
+    if os.path.lexists(folder) and not empty:
         raise ConflictError(
             "session-exists", f"{folder} is there already", "open it, or choose a new folder"
         )

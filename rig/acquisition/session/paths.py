@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
+CAPTURE_ID = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
 SESSION = "session.json"
 IMAGES = "images/rig1"
 """COLMAP's image path is ``images``; ``rig1`` is the rig's name there."""
@@ -26,6 +28,15 @@ INTENT = "intent.json"
 
 STAGED_RECORD = "capture.json"
 """In a stage: every file of the capture is there and durable."""
+
+STAGED = re.compile(rf"{INTENT}|{STAGED_RECORD}|({IMAGES}|{RAW})/[^/]+/\d{{6,}}\.[^/]+")
+"""All that is ever written in a stage, by its path there."""
+
+CHANGED = ".changed"
+"""Ends the name that a file gets which somebody else wrote in the place of one of ours."""
+
+HALF = re.compile(r"[^/]+\.half")
+"""All that is ever written in the folder of halves."""
 
 
 def picture(camera: str, instant: int, suffix: str, *, raw: bool = False) -> str:

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from common.errors import InputError
 from rig.acquisition.session import paths
-from rig.acquisition.session.commit import publish, set_aside, write_index
+from rig.acquisition.session.commit import clear_stage, publish, set_aside, write_index
 from rig.acquisition.session.index import SessionIndex
 from rig.acquisition.session.jsonfiles import read_model
 from rig.acquisition.session.records import CaptureRecord, FileEntry, InterruptedEntry
@@ -23,11 +23,13 @@ from rig.acquisition.session.tables import tables
 
 @dataclass(frozen=True)
 class Recovery:
-    """What was done, by capture id. Three empty lists: there was nothing to do."""
+    """What was done, by capture id. Empty lists: there was nothing to do."""
 
     committed: tuple[str, ...] = ()
     set_aside: tuple[str, ...] = ()
     dropped: tuple[str, ...] = ()
+    kept: tuple[str, ...] = ()
+    """Files in the way that somebody else wrote, by their paths in the session."""
 
 
 def recover_index(
@@ -38,12 +40,21 @@ def recover_index(
     ``known``: what is known of one capture, should it have to be set aside.
     """
     left = index.folder / paths.INCOMPLETE
+    if left.is_symlink():
+        raise InputError(
+            "session-damaged", f"{left} is a link, and no folder of this program", "move it away"
+        )
     if not left.is_dir():
         return index, Recovery()
+    before = _changed(index)
     committed, aside, dropped = [], [], []
     for stage in sorted(left.iterdir()):
         name = stage.name
-        if not stage.is_dir() or stage == index.scratch or index.committed(name) is not None:
+        ours = paths.CAPTURE_ID.fullmatch(name) and stage.is_dir() and not stage.is_symlink()
+        if not ours:
+            continue
+        if index.committed(name) is not None:
+            clear_stage(index, stage)
             continue
         record = _whole_record(index, stage)
         if record is not None:
@@ -55,10 +66,21 @@ def recover_index(
             index = set_aside(index, known if told and known is not None else entry)
             aside.append(name)
         else:
-            dropped.append(name)
+            clear_stage(index, stage)
+            if not stage.exists():
+                dropped.append(name)
     index = _renew_tables(index)
-    index.disk.remove(left)
-    return index, Recovery(tuple(committed), tuple(aside), tuple(dropped))
+    index.disk.sweep(index.scratch, paths.HALF.fullmatch)
+    index.disk.sweep(left, lambda _: False)
+    kept = [path for path in sorted(left.rglob("*")) if path.is_symlink() or not path.is_dir()]
+    kept += sorted(_changed(index) - before)
+    told = tuple(path.relative_to(index.folder).as_posix() for path in kept)
+    return index, Recovery(tuple(committed), tuple(aside), tuple(dropped), told)
+
+
+def _changed(index: SessionIndex) -> set[Path]:
+    """What was kept aside so far."""
+    return set(index.folder.rglob(f"*{paths.CHANGED}"))
 
 
 def interrupted(capture_id: str, fate: str, why: str) -> InterruptedEntry:

@@ -7,13 +7,14 @@ import errno
 import hashlib
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from common.errors import ConflictError, InputError
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 FORBIDDEN = (errno.EROFS, errno.EACCES, errno.EPERM)
+UNNAMEABLE = (errno.ENAMETOOLONG, errno.ENOTDIR, errno.ELOOP)
 CHUNK_BYTES = 1 << 20
 
 
@@ -61,11 +62,36 @@ class Disk:
         self.move(half, path)
         self.sync_folder(path.parent)
 
+    def sweep(self, folder: Path, ours: Callable[[str], object]) -> None:
+        """Remove the files below a folder that are ``ours`` by their paths in it.
+
+        Folders that are empty then go too, itself included. All else stays, links unfollowed.
+        """
+        if folder.is_symlink() or not folder.is_dir():
+            return
+        for path in sorted(folder.rglob("*"), reverse=True):
+            if path.is_symlink():
+                continue
+            if path.is_dir():
+                _remove_empty(path)
+            elif path.is_file() and ours(path.relative_to(folder).as_posix()):
+                path.unlink()
+        _remove_empty(folder)
+        self.sync_folder(folder.parent)
+
     def remove(self, folder: Path) -> None:
         """A folder with all that is in it; none is fine."""
         if folder.is_dir():
             shutil.rmtree(folder)
             self.sync_folder(folder.parent)
+
+
+def _remove_empty(folder: Path) -> None:
+    try:
+        folder.rmdir()
+    except OSError as error:
+        if error.errno not in (errno.ENOTEMPTY, errno.EEXIST, errno.EBUSY):
+            raise
 
 
 def sha256(data: bytes) -> str:
@@ -98,6 +124,12 @@ def disk_errors(folder: Path) -> Iterator[None]:
                 "disk-full",
                 f"there is no space left for {folder} ({reason})",
                 "free some, or choose a session on another disk",
+            ) from error
+        if error.errno in UNNAMEABLE:
+            raise InputError(
+                "session-unwritable",
+                f"there can be no folder {folder} ({reason})",
+                "choose another folder",
             ) from error
         if error.errno in FORBIDDEN:
             raise InputError(

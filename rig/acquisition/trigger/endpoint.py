@@ -136,7 +136,7 @@ class PtyEndpoint:
 def _leads_to(link: Path) -> str | None:
     """The text of a symbolic link; None for what is none."""
     try:
-        return os.readlink(link)
+        return str(link.readlink())
     except OSError:
         return None
 

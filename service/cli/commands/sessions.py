@@ -73,6 +73,7 @@ def run_sessions_verify_command(folder: Path, *, as_json: bool) -> None:
 def run_sessions_recover_command(folder: Path) -> None:
     """Put a session in order."""
     from rig.acquisition.session.folder import Session
+    from rig.acquisition.session.recovery import Recovery
     from service.cli.running import one_line_errors
 
     with one_line_errors(), Session.open(folder) as session:
@@ -81,8 +82,9 @@ def run_sessions_recover_command(folder: Path) -> None:
             ("committed", done.committed),
             ("set aside", done.set_aside),
             ("dropped", done.dropped),
+            ("not of this program, kept", done.kept),
         ):
             for name in names:
                 sys.stdout.write(f"{word}: {name}\n")
-        if not (done.committed or done.set_aside or done.dropped):
+        if done == Recovery():
             sys.stdout.write("nothing to do\n")

@@ -315,3 +315,51 @@ def test_the_usual_place_of_a_session(tmp_path: Path) -> None:
 
     folder = session_folder(tmp_path, "Jo Ann/../x", datetime(2026, 11, 22, 9, 5, 7))
     assert folder == tmp_path / "sub-JoAnnx" / "ses-20261122T090507"
+
+
+def test_only_beginnings_of_this_program_are_removed(tmp_path: Path) -> None:
+    plan = SessionPlan("memory", "0" * 64, {"rig/rig.json": b"{}"})
+    mine = (".ses.old.part/a.jpg", ".ses.0123abcd.part/photos/a.jpg", ".ses.0123abce.part/rig/x")
+    for name in (*mine, ".ses.0123abce.part/session.json"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text("mine")
+    (tmp_path / ".ses.0123abcf.part").symlink_to(tmp_path / ".ses.old.part")
+    (tmp_path / "ses").mkdir()
+    Session.create(tmp_path / "ses", plan).close()
+    assert all((tmp_path / name).read_text() == "mine" for name in mine)
+    assert verify_session(tmp_path / "ses").whole
+
+
+def test_recovery_keeps_and_tells_what_is_not_of_this_program(bench: BenchMaker) -> None:
+    made = bench(QUICK)
+    folder = made.session.folder
+    made.rig.capture(made.session, "one")
+    made.session.close()
+    mine = (".incomplete/raw/anna.jpg", ".incomplete/n.txt", ".incomplete/two/images/rig1/note.txt")
+    staged = (".incomplete/two/images/rig1/a/000002.jpg", ".incomplete/.scratch/frames.csv.half")
+    for name in (*mine, *staged):
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text("mine")
+    edited = folder / "frames.csv"
+    edited.write_text("mine")
+    with Session.open(folder) as session:
+        assert set(session.recovery.kept) == {*mine, "frames.csv.changed"}
+    assert all((folder / name).read_text() == "mine" for name in (*mine, "frames.csv.changed"))
+    assert not any((folder / name).exists() for name in staged)
+    made.session = Session.open(folder)
+    taken = folder / next(f.file.path for f in session.index.records[0].frames)
+    (taken.with_name("000002.jpg")).write_text("mine")
+    edited.write_text("mine, again")
+    assert made.rig.capture(made.session, "two").record.number == 2
+    assert all((folder / name).read_text() == "mine" for name in mine)
+    assert taken.with_name("000002.jpg.changed").read_text() == "mine"
+    assert (folder / "frames.csv.changed.changed").read_text() == "mine, again"
+
+
+def test_a_link_in_the_place_of_what_is_incomplete_is_told(tmp_path: Path) -> None:
+    Session.create(tmp_path / "ses", SessionPlan("memory", "0" * 64)).close()
+    (tmp_path / "ses" / ".incomplete").symlink_to(tmp_path)
+    with pytest.raises(InputError, match="is a link"):
+        Session.open(tmp_path / "ses")
+    with pytest.raises(InputError, match="there can be no folder"):
+        Session.create(tmp_path / ("n" * 250), SessionPlan("memory", "0" * 64))
