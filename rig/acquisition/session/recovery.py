@@ -74,8 +74,8 @@ def recover_index(
     index.disk.sweep(left, lambda _: False)
     kept = [path for path in sorted(left.rglob("*")) if path.is_symlink() or not path.is_dir()]
     kept += sorted(_changed(index) - before)
-    told = tuple(path.relative_to(index.folder).as_posix() for path in kept)
-    return index, Recovery(tuple(committed), tuple(aside), tuple(dropped), told)
+    others = tuple(path.relative_to(index.folder).as_posix() for path in kept)
+    return index, Recovery(tuple(committed), tuple(aside), tuple(dropped), others)
 
 
 def _changed(index: SessionIndex) -> set[Path]:
