@@ -53,6 +53,19 @@ def within(report: ProgressCallback, low: float, high: float, doing: str = "") -
     return tell
 
 
+class Rising:
+    """Hands progress on with a fraction that never falls, whatever the parts of a work report."""
+
+    def __init__(self, report: ProgressCallback) -> None:
+        self._report = report
+        self._reached = 0.0
+
+    def __call__(self, progress: Progress, /) -> None:
+        """Take note of ``progress``."""
+        self._reached = max(self._reached, progress.fraction)
+        self._report(replace(progress, fraction=self._reached))
+
+
 def ignore_progress(progress: Progress, /) -> None:
     """The progress callback that does nothing."""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import math
 from collections.abc import Collection
 
 
@@ -15,3 +16,15 @@ def did_you_mean(word: str, known: Collection[str], otherwise: str | None = None
     if close:
         return f"did you mean {close[0]}?"
     return f"choose one of {', '.join(known)}" if otherwise is None else otherwise
+
+
+def percent_cut(share: float, decimals: int = 2) -> str:
+    """A share (0 to 1) in percent with ``decimals`` places, cut: 100 says that it is all of it."""
+    scale = 10.0**decimals
+    # A binary 0.29 is a little less than 0.29: what only rounding took away is given back.
+    return f"{math.floor(100.0 * share * scale + 1e-9) / scale:.{decimals}f} %"
+
+
+def counted(count: int, noun: str) -> str:
+    """How many of something, such as ``1 capture`` and ``2 captures``."""
+    return f"{count} {noun}{'' if count == 1 else 's'}"

@@ -6,6 +6,8 @@ import html
 import math
 from collections.abc import Iterable, Sequence
 
+from common.words import percent_cut
+
 
 def esc(text: object) -> str:
     """``text`` as it may stand in HTML, in attributes too."""
@@ -28,12 +30,10 @@ def figure_text(value: float, digits: int = 3) -> str:
 
 
 def percent(share: float) -> str:
-    """A share as a percentage, rounded down near 100: 100 says that it is all of them."""
+    """A share as a percentage, cut: 100 says that it is all of them."""
     if math.isnan(share):
         return "–"
-    if 0.99 <= share < 1.0:
-        return f"{math.floor(share * 1e4) / 100.0:.2f} %"
-    return f"{100.0 * share:.1f}".removesuffix(".0") + " %"
+    return percent_cut(share, 2 if 0.99 <= share < 1.0 else 1).replace(".0 %", " %")
 
 
 def element(tag: str, content: str, **attributes: str) -> str:

@@ -90,7 +90,7 @@ class Gate:
                 f"pages of {_short(origin)} may not change anything here",
                 "allow the page's origin with RIGWRIGHT_ALLOWED_ORIGINS",
             )
-        return _wrong_type(method, path, headers)
+        return wrong_type(method, path, headers)
 
     def _known(self, host: str) -> bool:
         name = _name_of(host)
@@ -103,7 +103,8 @@ class Gate:
         return given in self._origins or urlsplit(given).netloc == host.lower() != ""
 
 
-def _wrong_type(method: str, path: str, headers: Headers) -> InputError | None:
+def wrong_type(method: str, path: str, headers: Headers) -> InputError | None:
+    """What is wrong with the media type of a request to ``path``; None for one that may come."""
     if method != "POST":
         # A browser asks before it sends these for a page, and nothing here reads their body.
         return None

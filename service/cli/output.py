@@ -26,6 +26,11 @@ def print_result_json(result: Result, files: Mapping[str, Path], **more: object)
     print_json(document | {"files": {name: str(path) for name, path in files.items()}})
 
 
+def say_next(what: str, *command: object) -> None:
+    """What comes next: a sentence, and the command that can be copied."""
+    sys.stdout.write(f"Next: {what}:\n  {' '.join(('rigwright', *map(str, command)))}\n")
+
+
 def show(lines: Mapping[str, object], *, as_json: bool) -> None:
     """Facts as JSON, or each on a line of its own."""
     if as_json:

@@ -19,7 +19,7 @@ from collections.abc import Callable
 from typing import Any, BinaryIO
 
 from common.errors import CancelledError, InternalError, RigwrightError, TooLargeError
-from common.progress import Progress
+from common.progress import Progress, Rising
 from service.ipc import TaskMessage, outcome_line, progress_line
 from service.jobs.engine import Running, Work
 from service.kinds.base import Result
@@ -58,7 +58,7 @@ def main(find: FindWork) -> int:
     limit = message.memory_limit_bytes
     if limit is not None:
         resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
-    out.write(outcome_line(_outcome(find, message, Running(_Reporter(out), cancel))))
+    out.write(outcome_line(_outcome(find, message, Running(Rising(_Reporter(out)), cancel))))
     return 0
 
 

@@ -26,5 +26,6 @@ class SessionProof(Model):
     whole: Annotated[bool, Field(description="Whether nothing was found.")]
     findings: list[FindingLine]
     captures: int
+    partial: Annotated[int, Field(description="How many of the captures lack pictures.")]
     files: int
     bytes: int

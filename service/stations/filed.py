@@ -46,6 +46,7 @@ def session_proof(folder: Path) -> SessionProof:
         whole=check.whole,
         findings=[FindingLine(kind=f.kind, path=f.path, text=f.text) for f in check.findings],
         captures=check.captures,
+        partial=check.partial,
         files=check.files,
         bytes=check.bytes,
     )

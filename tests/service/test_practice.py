@@ -109,6 +109,9 @@ def test_the_command_writes_them_and_says_what_comes_next(
     monkeypatch.chdir(tmp_path)
     done = CliRunner().invoke(app, ["practice"])
     assert done.exit_code == 0, done.output
-    assert "Next: rigwright capture --station practice/station.toml" in done.stdout
+    assert (
+        "  rigwright capture --station practice/station.toml --session sessions/monday --count 12\n"
+        in (done.stdout)
+    )
     assert CliRunner().invoke(app, ["practice"]).exit_code == 2
     assert CliRunner().invoke(app, ["practice", "--force"]).exit_code == 0

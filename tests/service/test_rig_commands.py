@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import json
+import re
 import signal
 import subprocess
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from service_helpers import RIGWRIGHT, rigwright_here, wait_for
 from stations import write_station
 
+from rig.acquisition.session.verify import SessionCheck
 from rig.acquisition.station.stationfile import read_station
 from rig.acquisition.trigger.fake.program import FakeTrigger, start_fake
+from service.cli.commands.capture import CaptureIds
 
 COMMANDS = (
     ["capture"],
@@ -49,6 +53,45 @@ def test_every_command_shows_an_example(command: list[str]) -> None:
     done = rigwright_here(*command, "--help")
     assert done.returncode == 0
     assert f"rigwright {' '.join(command)}" in " ".join(done.stdout.split()).partition("Example")[2]
+
+
+def test_made_up_names_sort_in_the_order_of_the_captures_within_a_second() -> None:
+    ids = CaptureIds()
+    names = [ids.next() for _ in range(50)]
+    assert names == sorted(names)
+    assert len({name.rpartition("-")[0] for name in names}) == 50  # not by chance
+    shape = re.compile(r"cap-\d{8}T\d{6}-\d{3}-[0-9a-f]{6}")
+    assert all(shape.fullmatch(name) for name in names)
+
+
+def test_several_captures_are_told_in_a_line_each(
+    tmp_path: Path, station: Path, box: FakeTrigger
+) -> None:
+    asked = ["capture", "--station", station, "--session", tmp_path / "two", "--count", "2"]
+    done = rigwright_here(*asked)
+    assert done.returncode == 0, done.stderr
+    first, *lines = done.stdout.splitlines()
+    assert first == f"session: {tmp_path / 'two'}"
+    assert [line.partition(":")[0] for line in lines] == ["1 of 2", "2 of 2"]
+    assert lines == sorted(lines, key=lambda line: line.split()[3])
+    assert "capture 2 of 2" in done.stderr
+    assert "arming" not in done.stderr
+    assert pulses(box) == 2
+
+
+def test_a_session_with_a_partial_capture_says_so(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    whole = SessionCheck((), captures=1, files=16, bytes=13_700_000)
+    for check, told in (
+        (whole, "1 capture, 16 files, 13.7 MB: whole\n"),
+        (
+            replace(whole, captures=2, partial=1),
+            "2 captures (1 partial: pictures are missing), 16 files, 13.7 MB: whole\n",
+        ),
+    ):
+        monkeypatch.setattr("rig.acquisition.session.verify.verify_session", lambda _, c=check: c)
+        assert rigwright_here("sessions", "verify", tmp_path).stdout == told
 
 
 def test_a_capture_is_filed_and_proven_whole(

@@ -48,6 +48,8 @@ class SessionCheck:
     captures: int = 0
     files: int = 0
     bytes: int = 0
+    partial: int = 0
+    """How many of the captures lack pictures."""
 
     @property
     def whole(self) -> bool:
@@ -74,7 +76,8 @@ def verify_session(folder: Path) -> SessionCheck:
         *_extras(folder, {entry.path for entry in listed}),
     ]
     size = sum(entry.bytes for entry in listed)
-    return SessionCheck(tuple(findings), len(index.records), len(listed) + 1, size)
+    partial = sum(record.state == "partial" for record in index.records)
+    return SessionCheck(tuple(findings), len(index.records), len(listed) + 1, size, partial)
 
 
 def _files(folder: Path, listed: Iterable[FileEntry]) -> Iterator[SessionFinding]:

@@ -71,7 +71,7 @@ def calibrate(
 
     from common.files.folders import new_folder
     from common.files.ownership import files_of
-    from service.cli.output import NOT_WELL, print_result_json
+    from service.cli.output import NOT_WELL, print_result_json, say_next
     from service.cli.pictures import TARGETS, picture_source
     from service.cli.running import one_line_errors, run_task
     from service.cli.tables import measurement_tables
@@ -101,3 +101,9 @@ def calibrate(
             print_files(files_of(out))
     if not result.converged or result.doubtful_lenses or result.unfit_lenses:
         raise typer.Exit(NOT_WELL)
+    if not as_json:
+        say_next(
+            f"open {out / 'report.html'} in a browser, and check the rig before each day's work",
+            *("check", "PICTURES", "--reference", out, "--out", "my-check"),
+            *("--history", "my-checks"),
+        )

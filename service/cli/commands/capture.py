@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import sys
+from datetime import datetime, timedelta
 from pathlib import Path
+from secrets import token_hex
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from common.progress import within
+from common.words import counted
 from service.cli.options import (
     JsonOption,
     KeyOption,
@@ -16,6 +21,7 @@ from service.cli.options import (
 )
 
 if TYPE_CHECKING:
+    from common.progress import ProgressCallback
     from service.cli.owner import Taken
 
 
@@ -75,8 +81,6 @@ def capture(
     Example:  rigwright capture --station station.toml --subject anna
     """
     from contextlib import ExitStack
-    from datetime import datetime
-    from secrets import token_hex
 
     from common.errors import CancelledError, InputError
     from service.cli.output import show
@@ -95,17 +99,19 @@ def capture(
                 "captures of one id are one capture",
                 "leave --id or --count out",
             )
-        requests = [
-            CaptureRequest(
-                capture_id=capture_id or f"cap-{datetime.now():%Y%m%dT%H%M%S}-{token_hex(3)}",
+        ids = CaptureIds()
+
+        def request() -> CaptureRequest:
+            return CaptureRequest(
+                capture_id=capture_id or ids.next(),
                 subject=subject,
                 operator=operator,
                 shots=shots,
                 interval_us=apart_us,
                 allow_partial=allow_partial,
             )
-            for _ in range(count)
-        ]
+
+        request()  # What is wrong with it is told before a device is opened.
         asked = stack.enter_context(rig_to_ask(Asked(station, server, key, rig)))
         cancel = stack.enter_context(cancel_on_signal())
         report = stack.enter_context(show_progress())
@@ -117,14 +123,41 @@ def capture(
             faults = [fault.text for fault in dry.faults]
             show({"ready": list(dry.ready), "faults": faults}, as_json=as_json)
             return
-        asked.file_in(session, requests[0])
-        for number, request in enumerate(requests):
+        asked.file_in(session, request())
+        for number in range(count):
             if number and cancel.wait(pause_s):
                 raise CancelledError
-            taken = asked.capture(request, report, cancel)
-            _show(taken, as_json=as_json)
+            telling = report if count == 1 else _one_of(report, number, count)
+            taken = asked.capture(request(), telling, cancel)
+            if count == 1 or as_json:
+                _show(taken, as_json=as_json)
+            else:
+                _show_in_a_line(taken, number, count)
             if taken.error is not None:
                 raise taken.error
+
+
+class CaptureIds:
+    """Names of captures: sorted as texts, they stand in the order in which they were made up."""
+
+    def __init__(self) -> None:
+        self._last = datetime.min
+
+    def next(self) -> str:
+        """The time to the millisecond, and letters that no other computer makes up."""
+        now = datetime.now()
+        now = now.replace(microsecond=now.microsecond // 1000 * 1000)
+        self._last = max(now, self._last + timedelta(milliseconds=1))
+        return f"cap-{self._last:%Y%m%dT%H%M%S}-{self._last.microsecond // 1000:03d}-{token_hex(3)}"
+
+
+def _one_of(report: ProgressCallback, number: int, count: int) -> ProgressCallback:
+    """Progress of one capture of several: which it is, without its own stages."""
+    from dataclasses import replace
+
+    part = within(report, number / count, (number + 1) / count)
+    stage = f"capture {number + 1} of {count}"
+    return lambda progress, /: part(replace(progress, stage=stage))
 
 
 def _show(taken: Taken, *, as_json: bool) -> None:
@@ -136,9 +169,23 @@ def _show(taken: Taken, *, as_json: bool) -> None:
             "capture": record.capture_id,
             "session": taken.session,
             "state": record.state,
-            "synchronised": record.verdict.text,
+            # Its sentence begins with the word; machines know it by the older name.
+            "synchronised" if as_json else "verdict": record.verdict.text,
             "faults": [fault.text for fault in record.faults],
             "pictures": taken.pictures,
         },
         as_json=as_json,
     )
+
+
+def _show_in_a_line(taken: Taken, number: int, count: int) -> None:
+    record = taken.record
+    if number == 0:
+        sys.stdout.write(f"session: {taken.session}\n")
+    sys.stdout.write(
+        f"{number + 1} of {count}: {record.capture_id}, {record.state}, "
+        f"{counted(len(taken.pictures), 'picture')}; {record.verdict.text}\n"
+    )
+    for fault in record.faults:
+        sys.stdout.write(f"  fault: {fault.text}\n")
+    sys.stdout.flush()

@@ -61,7 +61,7 @@ def check(
     """
     from common.files.folders import new_folder
     from common.files.ownership import files_of
-    from service.cli.output import NOT_WELL, print_result_json
+    from service.cli.output import NOT_WELL, print_result_json, say_next
     from service.cli.pictures import picture_source, reference_file
     from service.cli.running import one_line_errors, run_task
     from service.cli.tables import measurement_tables
@@ -88,6 +88,12 @@ def check(
             print_files(files_of(out))
     if result.light == "red":
         raise typer.Exit(NOT_WELL)
+    if not as_json:
+        say_next(
+            f"open {out / 'report.html'} in a browser; a bar tells whether the rig measures right",
+            *("accept", "BAR-PICTURES", "--reference", reference),
+            *("--targets", "BAR.toml", "--out", "my-acceptance"),
+        )
 
 
 def _targets_beside(reference: Path) -> Path:

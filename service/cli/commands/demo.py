@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -24,6 +23,7 @@ def demo(
     Example:  rigwright demo --out demo
     """
     from service.cli.commands.design import run_design
+    from service.cli.output import say_next
     from service.cli.running import processes
     from service.kinds.base import RunContext
     from service.kinds.design import DEMO, DemoRequest
@@ -31,7 +31,7 @@ def demo(
     run = RunContext(workers=processes(workers))
     run_design(DEMO, DemoRequest, {}, run, out, as_json=as_json, force=force)
     if not as_json:
-        sys.stdout.write(
-            f"Next: open {out / 'report.html'} in a browser, then fire its simulated cameras:\n"
-            f"  rigwright capture --station {out / 'station.toml'} --session sessions/first\n"
+        say_next(
+            f"open {out / 'report.html'} in a browser, then fire its simulated cameras",
+            *("capture", "--station", out / "station.toml", "--session", "sessions/first"),
         )

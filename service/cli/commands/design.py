@@ -61,6 +61,7 @@ def design(
     Example:  rigwright design head.glb --rig face.toml --out rig --cameras 7
     """
     from rig.specification.rigfile import read_rig_file
+    from service.cli.output import say_next
     from service.cli.running import processes, require_files
     from service.kinds.base import RunContext
     from service.kinds.design import DESIGN, DesignRequest
@@ -75,6 +76,11 @@ def design(
     run_design(
         DESIGN, request, {"scan": scan}, run, out, spare=[scan, rig], as_json=as_json, force=force
     )
+    if not as_json:
+        say_next(
+            f"open {out / 'report.html'} in a browser, then plan what holds the cameras",
+            *("plan", out / "design.json", "--mount", "SYSTEM.toml", "--out", "my-plan"),
+        )
 
 
 def standing_design(rig: Path, scan: Path, folder: Path) -> Path:

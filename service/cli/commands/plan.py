@@ -157,4 +157,8 @@ def _show(result: PlanResult, out: Path, *, as_json: bool) -> None:
         print_result_json(result, files)
         return
     plan_tables.print_plan(result)
-    sys.stdout.write(f"Written: {len(files)} files under {out}, begin with {out / 'plan.html'}\n")
+    sys.stdout.write(
+        f"Written: {len(files)} files under {out}\n"
+        f"Next: open {out / 'plan.html'} in a browser; build by {out / 'steps.txt'}, and set each "
+        f"camera by its sheet in {out / 'settings'}\n"
+    )

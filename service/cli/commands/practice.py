@@ -23,6 +23,7 @@ def practice(
     """
     from common.files.folders import new_folder
     from common.files.ownership import files_of
+    from service.cli.output import say_next
     from service.cli.running import one_line_errors
 
     with one_line_errors():
@@ -32,6 +33,8 @@ def practice(
             write_practice(folder)
         for path in files_of(out).values():
             sys.stdout.write(f"{path}\n")
-        sys.stdout.write(
-            f"Next: rigwright capture --station {out / 'station.toml'} --session sessions/monday\n"
+        say_next(
+            "photograph its targets in twelve places",
+            *("capture", "--station", out / "station.toml"),
+            *("--session", "sessions/monday", "--count", 12),
         )

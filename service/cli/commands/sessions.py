@@ -5,11 +5,14 @@ from __future__ import annotations
 import dataclasses
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from service.cli.options import JsonOption
+
+if TYPE_CHECKING:
+    from rig.acquisition.session.verify import SessionCheck
 
 sessions = typer.Typer(name="sessions", help="Look after sessions.", no_args_is_help=True)
 
@@ -46,6 +49,7 @@ def sessions_recover(
 def run_sessions_verify_command(folder: Path, *, as_json: bool) -> None:
     """Prove a session whole."""
     from common.errors import InputError
+    from common.words import counted
     from rig.acquisition.session.verify import verify_session
     from service.cli.output import print_json
     from service.cli.running import one_line_errors
@@ -59,15 +63,20 @@ def run_sessions_verify_command(folder: Path, *, as_json: bool) -> None:
             for finding in check.findings:
                 sys.stdout.write(f"{finding.kind}: {finding.path}: {finding.text}\n")
             sys.stdout.write(
-                f"{check.captures} captures, {check.files} files, {check.bytes / 1e6:.1f} MB: "
+                f"{counted(check.captures, 'capture')}{_partial(check)}, "
+                f"{counted(check.files, 'file')}, {check.bytes / 1e6:.1f} MB: "
                 f"{'whole' if check.whole else 'NOT whole'}\n"
             )
         if not check.whole:
             raise InputError(
                 "session-not-whole",
-                f"session {folder} is not whole: {len(check.findings)} findings",
+                f"session {folder} is not whole: {counted(len(check.findings), 'finding')}",
                 "see the list, and take a copy that is",
             )
+
+
+def _partial(check: SessionCheck) -> str:
+    return f" ({check.partial} partial: pictures are missing)" if check.partial else ""
 
 
 def run_sessions_recover_command(folder: Path) -> None:

@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from common.words import percent_cut
 from rig.design.designmodel import ConstraintFigures
 from service.kinds.design import DesignResult
 from service.kinds.evaluation import EvaluationResult
@@ -19,7 +20,7 @@ def _number(value: float | None, unit: str = "") -> str:
 
 
 def _share(value: float | None) -> str:
-    return "-" if value is None else f"{100.0 * value:.2f} %"
+    return "-" if value is None else percent_cut(value)
 
 
 def print_figures(result: EvaluationResult, start_cost_mm2: float | None = None) -> None:

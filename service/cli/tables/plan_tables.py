@@ -6,6 +6,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from common.words import percent_cut
 from service.kinds.plan import PlanPrice, PlanResult
 
 
@@ -75,8 +76,8 @@ def _print_price(console: Console, price: PlanPrice) -> None:
         table.add_row(
             label,
             _figure(row.sigma_median_mm, 5),
-            f"{100.0 * row.coverage_2_views:.2f} %",
-            f"{100.0 * row.coverage_3_views:.2f} %",
+            percent_cut(row.coverage_2_views),
+            percent_cut(row.coverage_3_views),
             "kept" if row.feasible else ", ".join(map(escape, row.broken[:3])),
         )
     console.print(table)

@@ -64,7 +64,8 @@ export function capturing(rig, signal) {
 }
 
 function captureId() {
-  const now = new Date().toISOString().replace(/[-:]/g, "").replace("T", "-").slice(0, 15);
+  // To the millisecond: ids sort in the order in which they were fired.
+  const now = new Date().toISOString().replace(/[-:]/g, "").replace(/[T.]/g, "-").slice(0, 19);
   return `${now}-${Math.random().toString(36).slice(2, 6)}`;
 }
 

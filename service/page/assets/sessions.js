@@ -103,7 +103,7 @@ async function prove(own, place) {
   try {
     const proof = await post(`${own}/verify`);
     fill(place, h("p", { class: proof.whole ? "good" : "bad" }, proof.whole
-      ? `Whole: ${proof.captures} captures, ${proof.files} files, ${(proof.bytes / 1e6).toFixed(1)} MB, each as it was filed.`
+      ? `Whole: ${proof.captures} capture${proof.captures === 1 ? "" : "s"}${proof.partial ? ` (${proof.partial} partial: pictures are missing)` : ""}, ${proof.files} files, ${(proof.bytes / 1e6).toFixed(1)} MB, each as it was filed.`
       : "Not as it was filed:"),
     proof.whole ? null : table("", ["File", "What"], proof.findings.map((finding) => [finding.path, finding.text])));
   } catch (error) {
