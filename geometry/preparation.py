@@ -104,7 +104,8 @@ def _region(
     x, y, z = region.nose_tip_mm
     text = (
         f"face found: nose tip at ({x:z.0f}, {y:z.0f}, {z:z.0f}) mm, within "
-        f"{region.radius_mm:g} mm of it; {region.excluded_share:.1%} of it is hard to see from the front and left out"
+        f"{region.radius_mm:g} mm of it; {region.excluded_share:.1%} of it is "
+        "hard to see from the front and left out"
     )
     return region, points, (ScanNote("inferred", text),)
 

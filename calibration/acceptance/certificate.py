@@ -110,7 +110,7 @@ def _table(acceptance: Acceptance) -> Flowable:
     from reportlab.lib import colors
     from reportlab.platypus import Table
 
-    head = ("Line", "Length", "calibrated, mm", "error, um", "sigma, um", "limit, um", "")
+    head = ("Line", "Length", "calibrated, mm", "error, um", "sigma, um", "limit, um", "state")
     rows = [
         (
             m.line,
@@ -119,7 +119,7 @@ def _table(acceptance: Acceptance) -> Flowable:
             f"{m.error_um:+.1f}",
             f"{m.sigma_um:.1f}",
             f"{m.limit_um:.1f}",
-            "" if m.within else "beyond",
+            "within" if m.within else "beyond",
         )
         for m in acceptance.lengths
     ]

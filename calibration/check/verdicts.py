@@ -28,6 +28,11 @@ class Kind(StrEnum):
     UNEXPLAINED = "unexplained"
     CANNOT_TELL = "cannot-tell"
 
+    @property
+    def words(self) -> str:
+        """The kind as people read it."""
+        return self.value.replace("-", " ")
+
 
 class Light(StrEnum):
     """The whole check in one word: go on, look, or stop."""

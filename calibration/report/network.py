@@ -14,6 +14,9 @@ from geometry.arrays import Floats
 from geometry.camera import TERM_NAMES
 
 _WIDTH, _MARGIN = 480.0, 40.0
+_TALLEST = 320.0
+"""Cameras may stand far from the targets: the view from above is drawn smaller, not taller."""
+
 _SIGHT_SHARE = 0.2
 """How long a line of sight is drawn, of the width of what is shown."""
 
@@ -109,11 +112,13 @@ def network_figures(calibration: Calibration) -> str:
 def _placing(points: Floats) -> tuple[Callable[[Floats], tuple[float, float]], float]:
     """Where points (n, 2) of the rig fall in the picture, and how tall it is."""
     low, high = points.min(axis=0), points.max(axis=0)
-    scale = (_WIDTH - 2.0 * _MARGIN) / max(float((high - low)[0]), 1e-9)
+    room = np.array([_WIDTH, _TALLEST]) - 2.0 * _MARGIN
+    scale = float((room / np.maximum(high - low, 1e-9)).min())
     height = float((high - low)[1]) * scale + 2.0 * _MARGIN
+    left = (_WIDTH - float((high - low)[0]) * scale) / 2.0
 
     def at(point: Floats) -> tuple[float, float]:
         x, y = (point - low) * scale
-        return _MARGIN + float(x), height - _MARGIN - float(y)
+        return left + float(x), height - _MARGIN - float(y)
 
     return at, height

@@ -15,7 +15,7 @@ from calibration.report.network import network_figures, turning_figure, values_t
 from calibration.report.residualplot import residual_plot
 from calibration.report.views import DetectionView, views_figures
 from common.page.document import drawn_page, still_page
-from common.page.html import esc, text_table
+from common.page.html import esc, table, text_table
 from common.page.svg import GREEN, RED, YELLOW, Series, chart
 
 STYLE = """
@@ -25,12 +25,17 @@ h1{font-size:1.5rem}h2{font-size:1.1rem;margin-top:2rem}
 .table{overflow-x:auto}table{border-collapse:collapse;width:100%;font-variant-numeric:tabular-nums}
 th,td{padding:.25rem .5rem;text-align:right;border-bottom:1px solid #e2e8ee}
 th:first-child,td:first-child{text-align:left}th{font-weight:600;vertical-align:bottom}
+tr.bad td{background:#fdecea;font-weight:600}
 .light{display:inline-block;width:1.6rem;height:1.6rem;border-radius:50%;vertical-align:middle}
 .finding{border-left:.35rem solid;padding:.4rem .8rem;margin:.6rem 0;background:#f6f8fa}
 .plots{display:flex;flex-wrap:wrap;gap:1rem}.plots figure{width:300px;margin:0}
 #network-3d{height:480px}
 figcaption,small,.note{color:#52606d;font-size:.85rem}svg{max-width:100%;height:auto}
 """
+UNSEEN = (
+    "A camera has no point where a check did not see it, or where it is fine and its test answers "
+    "only to what was found of another."
+)
 COLOURS = {Light.GREEN: GREEN, Light.YELLOW: YELLOW, Light.RED: RED}
 HEADLINES = {
     Light.GREEN: "Fine: go on working",
@@ -40,10 +45,11 @@ HEADLINES = {
 
 
 def number(value: float, digits: int = 3) -> str:
-    """A number with so many significant digits, a dash for none."""
+    """A number with so many significant digits, thousands apart, a dash for none."""
     if value != value:
         return "-"
-    return f"{value:.{digits}g}" if abs(value) < 1e5 else f"{value:.2e}"
+    short = f"{value:.{digits}g}"
+    return f"{float(short):,.0f}" if 10.0**digits <= abs(value) < 1e9 else short
 
 
 def light(colour: Light) -> str:
@@ -57,25 +63,29 @@ def finding(sentence: str, colour: str) -> str:
     return f'<div class="finding" style="border-color:{colour}">{esc(sentence)}</div>'
 
 
-def check_page(record: CheckRecord, reference: Calibration | None = None) -> str:
+def check_page(record: CheckRecord, reference: Calibration | None = None, history: str = "") -> str:
     """One check: light, findings, cameras, carriers, lengths, residuals.
 
     ``reference`` gives the image sizes for the residual plots; without it there are none.
+    ``history``: the file beside it that shows the checks over time, if there is one.
     """
     result = record.result
     title = f"Calibration check {record.made_utc}".strip()
     parts = [
         f"<h1>{light(result.light)} {esc(HEADLINES[result.light])}</h1>",
-        f"<p>Reference: {esc(record.reference or 'unnamed')}. {esc(record.made_utc)}</p>",
+        f"<p>Compared with the calibration {esc(record.reference or 'without a name')}. "
+        f"Checked {esc(record.made_utc or 'at a time that is not known')}.</p>",
+        *([f'<p><a href="{esc(history)}">All checks over time</a></p>'] if history else []),
         *(finding(f.sentence, COLOURS[f.light]) for f in result.findings),
         *(f'<p class="note">{esc(note)}</p>' for note in result.notes),
         "<h2>Cameras</h2>",
         _camera_table(result.cameras),
-        f'<p class="note">Load: the pose test over its limit, an alarm above 1 unless a finding '
+        f'<p class="note">Test: the pose test over its limit, an alarm above 1 unless a finding '
         "explains it: points tie the cameras together, so where one moves others' tests answer. "
-        "At subject: root mean square over what the camera saw; a sentence above gives the "
-        "largest over a face. Smallest: what "
-        "this check could have seen of a movement (Baarda, delta0 4.13); "
+        "Effect: root mean square over what the camera saw, in mm at the subject; a sentence "
+        "above gives the largest over a face. Could hide: what points at the subject may be "
+        "off without this check seeing it; smallest turn and shift: what "
+        "it could have seen of a movement (Baarda, delta0 4.13); "
         f"{result.power95_factor:.1f} times as much is reported in 95 of 100 checks.</p>",
         "<h2>Targets</h2>",
         _carrier_table(result),
@@ -100,43 +110,49 @@ def _camera_table(cameras: tuple[CameraCheck, ...]) -> str:
         "points",
         "rms px",
         "noise",
-        "load",
-        "moved px",
-        "at subject um",
+        "test",
+        "effect mm",
+        "effect px",
+        "could hide mm",
         "smallest turn urad",
         "smallest shift um",
-        "smallest at subject um",
     )
     rows = []
     for c in cameras:
         sees = c.sensitivity
         turn = max(sees.turn_urad[:2]) if sees else float("nan")
         shift = max(sees.shift_um) if sees else float("nan")
-        hidden = 1e3 * sees.hidden_mm if sees else float("nan")
-        told = c.verdict.value + (f" ({c.reason})" if c.verdict is Kind.CANNOT_TELL else "")
+        hidden = sees.hidden_mm if sees else float("nan")
+        told = c.verdict.words + (f" ({c.reason})" if c.verdict is Kind.CANNOT_TELL else "")
         numbers = (
             c.rms_px,
             c.noise_factor,
+            c.effect_mm,
             c.effect_px,
-            1e3 * c.effect_mm,
+            hidden,
             turn,
             shift,
-            hidden,
         )
         figures = [number(v) for v in numbers]
         load = "explained" if explained(c) else number(c.pose_statistic / c.pose_limit)
         rows.append((c.name, told, str(c.points), *figures[:2], load, *figures[2:]))
-    return text_table(head, rows)
+    marks = ["" if c.verdict is Kind.FINE else "bad" for c in cameras]
+    return _marked(head, rows, marks)
+
+
+def _marked(head: Sequence[str], rows: Sequence[Sequence[str]], marks: Sequence[str]) -> str:
+    cells = ([esc(cell) for cell in row] for row in rows)
+    return table([esc(cell) for cell in head], cells, row_css=marks)
 
 
 def _carrier_table(result: CheckResult) -> str:
     head = ("carrier", "verdict", "points", "rms px", "scale ppm", "sigma ppm", "worst target")
-    return text_table(
+    return _marked(
         head,
-        (
+        [
             (
                 c.name,
-                c.verdict.value,
+                c.verdict.words,
                 str(c.points),
                 number(c.rms_px),
                 number(c.scale_ppm),
@@ -144,7 +160,8 @@ def _carrier_table(result: CheckResult) -> str:
                 c.worst_target,
             )
             for c in result.carriers
-        ),
+        ],
+        ["" if c.verdict is Kind.FINE else "bad" for c in result.carriers],
     )
 
 
@@ -244,7 +261,8 @@ def calibration_page(record: CalibrationRecord, views: Sequence[DetectionView] =
                 f'<div class="plots">{plots}</div>',
             ]
         ),
-        footer="",
+        footer='<p class="note">Next: check before each day\'s work that the rig is still so, with '
+        "a few pictures of the same targets (rigwright check PICTURES --reference FOLDER).</p>",
         style=STYLE,
         figures=json.dumps({"figure": turning_figure(calibration)}, allow_nan=False),
         script=files("calibration.report").joinpath("network.js").read_text(encoding="utf-8"),
@@ -266,12 +284,14 @@ def history_page(history: History) -> str:
             strict=True,
         )
     ]
+    gaps = any(load != load for c in history.cameras for load in c.load)
     return still_page(
         "Calibration checks over time",
         "".join(
             [
                 f"<h1>Checks against {esc(history.reference or 'the reference')}</h1>",
                 history_svg(history),
+                f'<p class="note">{UNSEEN}</p>' if gaps else "",
                 chart(
                     history.times,
                     effects,

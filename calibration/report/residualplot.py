@@ -18,15 +18,21 @@ def residual_plot(grid: Sequence[GridCell], size_px: tuple[int, int], name: str)
     """Mean residuals over a camera's image as arrows, with the scale of the longest."""
     width, height = size_px
     unit = width / 100.0
+    # No arrow is longer: none is cut at the edge of the drawing.
+    room = ARROW_SHARE * width
     parts = [
-        f'<rect x="0" y="0" width="{width}" height="{height}" fill="none" stroke="{FAINT}" '
-        f'stroke-width="{unit:.1f}"/>'
+        f'<rect x="{room:.1f}" y="{room:.1f}" width="{width}" height="{height}" fill="none" '
+        f'stroke="{FAINT}" stroke-width="{unit:.1f}"/>'
     ]
     longest = max((float(np.hypot(c.dx_px, c.dy_px)) for c in grid), default=0.0)
     scale = ARROW_SHARE * width / max(longest, 1e-9)
     for cell in grid:
-        tip = cell.x_px + scale * cell.dx_px, cell.y_px + scale * cell.dy_px
-        parts.append(line(cell.x_px, cell.y_px, *tip, INK, 0.45 * unit))
-        parts.append(dot(cell.x_px, cell.y_px, 0.7 * unit, INK))
+        x, y = cell.x_px + room, cell.y_px + room
+        tip = x + scale * cell.dx_px, y + scale * cell.dy_px
+        parts.append(line(x, y, *tip, INK, 0.45 * unit))
+        parts.append(dot(x, y, 0.7 * unit, INK))
     label = f"{name}: longest arrow {longest:.3f} px"
-    return drawing(width, height, parts, label) + f"<figcaption>{escape(label)}</figcaption>"
+    return (
+        drawing(width + 2.0 * room, height + 2.0 * room, parts, label)
+        + f"<figcaption>{escape(label)}</figcaption>"
+    )

@@ -10,6 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 GREEN, YELLOW, RED, INK, FAINT = "#1a7f37", "#b08800", "#b42318", "#1f2933", "#c4ccd4"
+_NAME_PX = 12.0
 Placing = Callable[[int, float], tuple[float, float]]
 
 
@@ -70,6 +71,7 @@ def chart(
         parts += [dashed, words(width - 116.0, y - 4.0, 11, "alarm")]
     for n, one in enumerate(series):
         parts += _curve(one, n, len(series), place)
+    parts += _names(series, place)
     ends = sorted({0, len(times) - 1}) if times else []
     for k in ends:
         anchor = "start" if k == 0 else "end"
@@ -83,6 +85,18 @@ def _curve(one: Series, number: int, count: int, place: Placing) -> list[str]:
     spots = [place(k, v) for k, v in points]
     parts = [line(*a, *b, colour, 1.6) for a, b in pairwise(spots)]
     parts += [dot(x, y, 3.0, colour) for x, y in spots]
-    if spots:
-        parts.append(words(spots[-1][0] + 7.0, spots[-1][1] + 4.0, 11, one.name))
+    return parts
+
+
+def _names(series: Sequence[Series], place: Placing) -> list[str]:
+    """Each line's name at its last point, moved down where another name is in its way."""
+    ends = [
+        (*place(*points[-1]), one.name)
+        for one in series
+        if (points := [(k, v) for k, v in enumerate(one.values) if np.isfinite(v) and v > 0.0])
+    ]
+    parts, lowest = [], dict[float, float]()
+    for x, y, name in sorted(ends):
+        lowest[x] = max(y, lowest.get(x, -np.inf) + _NAME_PX)
+        parts.append(words(x + 7.0, lowest[x] + 4.0, 11, name))
     return parts

@@ -54,7 +54,8 @@ def _constraints(rows: list[ConstraintRow]) -> str:
                 element("span", esc(title), title=words) + subject,
                 figure_text(row.value, 4) + unit,
                 _asked(row) + unit,
-                figure_text(_without_rounding(row.slack, row.limit)) + unit,
+                figure_text(_without_rounding(row.slack, max(abs(row.limit), abs(row.value))))
+                + unit,
                 f'<span class="badge {state}">{state}</span>',
             )
         )

@@ -96,11 +96,12 @@ def rig_check(task: Task[CheckRequest, CheckOutcome], running: Running) -> Check
     result = check(reference, seen.observations, options, _after(running.report), running.cancel)
     record = CheckRecord(name, task.run.made_utc, result)
     CHECKS.write(task.folder / "check.json", record)
-    _write(task.folder / "report.html", check_page(record, reference))
     earlier = [CHECKS.read(path) for role, path in task.inputs.items() if role.startswith("check-")]
+    beside = "history.html" if earlier else ""
+    _write(task.folder / "report.html", check_page(record, reference, beside))
     if earlier:
         history = history_of([*earlier, record], name)
-        _write(task.folder / "history.html", history_page(history))
+        _write(task.folder / beside, history_page(history))
     running.report(Progress("done", 1.0))
     return check_result(result, detection_of(seen))
 

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from drawn_pages import parts
 
+from calibration.adjustment.residualgrid import GridCell
 from calibration.adjustment.result import Calibration
 from calibration.check import CheckOptions, CheckResult, check
 from calibration.check.verdicts import Kind
@@ -21,7 +22,9 @@ from calibration.detection.pictures import DetectedPictures, TakenPicture
 from calibration.files import CalibrationRecord, CheckRecord
 from calibration.report import calibration_page, check_page, history_of, history_page, history_svg
 from calibration.report.network import network_figures, target_places
+from calibration.report.residualplot import residual_plot
 from calibration.report.views import detection_views
+from common.page.svg import Series, chart
 
 NASTY = '<script>alert("x")</script>'
 
@@ -88,6 +91,38 @@ def test_the_check_page_says_it_in_words_numbers_and_pictures() -> None:
     assert reader.seen.count("svg") == 5
     assert NASTY not in page
     assert "nan" not in page.replace("nannt", "")
+
+
+def test_what_is_wrong_stands_out_in_words_and_plain_figures() -> None:
+    reference, result = calibrations.small_reference(), moved_check(3000.0, 1)
+    moved = next(c for c in result.cameras if c.verdict is Kind.CAMERA_MOVED)
+    assert moved.pose_statistic / moved.pose_limit > 1e3
+    page = check_page(CheckRecord("rig", "2026-11-22T10:00:00Z", result), reference, "history.html")
+    assert f'<tr class="bad"><td>{moved.name}</td><td>camera moved</td>' in page
+    assert page.count('<tr class="bad">') == 1
+    assert "e+0" not in page
+    assert '<a href="history.html">' in page
+    assert "<a " not in check_page(CheckRecord("rig", "", result))
+
+
+def test_arrows_of_residuals_stay_within_their_drawing() -> None:
+    corners = [
+        GridCell(x, y, dx, dy, 1) for x, dx in ((0, -1), (99, 1)) for y, dy in ((0, -1), (79, 1))
+    ]
+    figure = ET.fromstring(  # noqa: S314 - written by ourselves
+        residual_plot(corners, (100, 80), "cam").partition("<figcaption>")[0]
+    )
+    width, height = (float(v) for v in figure.attrib["viewBox"].split()[2:])
+    for arrow in figure.findall("line"):
+        assert 0.0 <= float(arrow.attrib["x2"]) <= width
+        assert 0.0 <= float(arrow.attrib["y2"]) <= height
+
+
+def test_names_at_one_place_of_a_chart_do_not_cover_each_other() -> None:
+    series = [Series(f"cam{k}", (0.1, value)) for k, value in enumerate((1.0, 1.01, 1.02, 9.0))]
+    figure = ET.fromstring(chart(("a", "b"), series, 0.0, "", ""))  # noqa: S314 - our own
+    at = sorted(float(t.attrib["y"]) for t in figure.findall("text") if str(t.text)[:3] == "cam")
+    assert len(at) == 4 and min(np.diff(at)) >= 11.0  # the size of the letters
 
 
 def test_the_calibration_page_has_all_cameras() -> None:

@@ -237,7 +237,7 @@ def _parts(bill: Bill) -> str:
             esc(line.name),
             esc(line.part),
             str(line.quantity),
-            "" if line.length_mm is None else mm(line.length_mm),
+            "" if line.length_mm is None else _apart(line.length_mm),
             "–" if line.mass_g is None else f"{line.mass_g:.0f}",
             "–" if line.cost is None else f"{line.cost:.2f}",
             esc(line.note),
@@ -250,6 +250,11 @@ def _parts(bill: Bill) -> str:
     head = ("Part", "Id", "Count", "Length mm", "Mass g", f"Cost{currency}", "")
     words = "What to buy and to make. Figures that nobody published are left out of the sums."
     return section("parts", "Parts", words, table(head, rows))
+
+
+def _apart(length_mm: float) -> str:
+    """A length with its thousands apart; tenths only where there are any."""
+    return f"{length_mm:,.1f}".removesuffix(".0").replace(",", "\u202f")
 
 
 def _cuts(cuts: tuple[Cut, ...]) -> str:

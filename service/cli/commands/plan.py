@@ -96,6 +96,11 @@ def plan(
     if why:
         sys.stderr.write(f"rigwright: {why}\n")
         raise typer.Exit(EXIT_INFEASIBLE)
+    if not as_json:
+        sys.stdout.write(
+            f"Next: build by {out / 'steps.txt'}, and set each camera by its sheet in "
+            f"{out / 'settings'}\n"
+        )
     words = caution(result)
     if words:
         sys.stderr.write(f"rigwright: note: {words}\n")
@@ -157,8 +162,4 @@ def _show(result: PlanResult, out: Path, *, as_json: bool) -> None:
         print_result_json(result, files)
         return
     plan_tables.print_plan(result)
-    sys.stdout.write(
-        f"Written: {len(files)} files under {out}\n"
-        f"Next: open {out / 'plan.html'} in a browser; build by {out / 'steps.txt'}, and set each "
-        f"camera by its sheet in {out / 'settings'}\n"
-    )
+    sys.stdout.write(f"Written: {len(files)} files under {out}, begin with {out / 'plan.html'}\n")

@@ -122,7 +122,7 @@ def print_check(result: CheckOutcome) -> None:
     for row in result.cameras:
         table.add_row(
             escape(row.name),
-            row.verdict + (f" ({escape(row.reason)})" if row.reason else ""),
+            row.verdict.replace("-", " ") + (f" ({escape(row.reason)})" if row.reason else ""),
             _load(row.pose_statistic, row.pose_limit, row.verdict),
             _number(row.effect_mm),
             _number(row.effect_px),
@@ -139,7 +139,7 @@ def print_acceptance(result: AcceptanceResult) -> None:
     lines = {name: k for k, name in enumerate(dict.fromkeys(r.line for r in result.lengths), 1)}
     _say(*(f"line {k}: {name}" for name, k in lines.items()))
     table = Table(
-        *("Line", "Length", "mm", "Error um", "Limit um", ""),
+        *("Line", "Length", "mm", "Error um", "Limit um", "State"),
         title="Lengths",
         title_justify="left",
     )
@@ -150,7 +150,7 @@ def print_acceptance(result: AcceptanceResult) -> None:
             _number(row.calibrated_mm, 4),
             f"{row.error_um:+.1f}",
             _number(row.limit_um, 1),
-            "" if row.within else "BEYOND",
+            "within" if row.within else "BEYOND",
         )
     Console().print(table)
     _say(*result.notes)
