@@ -63,8 +63,9 @@ def plan_figure(
         trace, name, moves = _kind_trace(kind, [solids[k] for k in rows], apart[rows])
         figure.add_trace(trace)
         ways[name] = moves
+    # Aimed below its middle: the nearest axis's title is at the lower edge of the scene.
     # A plate hides its cameras from behind; it is worked on from the subject's side.
-    figure.update_layout(**scene_layout(0.85, aim_z=0.0, behind=not plan.structure.plates))
+    figure.update_layout(**scene_layout(0.85, aim_z=-0.18, behind=not plan.structure.plates))
     legend = {"orientation": "h", "x": 0.0, "y": 0.0, "yanchor": "top", "bgcolor": "rgba(0,0,0,0)"}
     figure.update_layout(legend=legend, margin={"l": 0, "r": 0, "t": 0, "b": 60})
     return figure, ways
