@@ -127,7 +127,7 @@ def shifts(built: Built) -> Mapping[str, Floats]:
 @pytest.mark.slow
 @pytest.mark.parametrize(("kind", "stays"), [("t-slot", False), ("t-slot", True), ("arc", True)])
 def test_a_rig_sinks_as_another_program_says(kind: str, *, stays: bool) -> None:
-    """Screws and nuts, some grams each, are left out by the other: 10 % is asked, 3 % found."""
+    """Joints are rods as stiff in both: what is left is rounding of two solvers, 4e-6 found."""
     holding = held(kind)
     built = (holding.with_stays() if stays else holding).build()
     theirs = shifts(built)
@@ -135,4 +135,4 @@ def test_a_rig_sinks_as_another_program_says(kind: str, *, stays: bool) -> None:
         size = float(np.linalg.norm(theirs[sag.camera]))
         assert size > 0.05, "something gives way"
         off = float(np.linalg.norm(sag.shift_mm - theirs[sag.camera]))
-        assert off < 0.1 * size, (sag.camera, sag.shift_mm, theirs[sag.camera])
+        assert off < 1e-3 * size, (sag.camera, sag.shift_mm, theirs[sag.camera])
