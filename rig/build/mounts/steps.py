@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 from rig.build.mounts.settings import CameraMount, Setting
 from rig.build.mounts.structure import Joint, Member, Plate, Structure, Wedge
 from rig.build.parts.screws import screw_mm
 from rig.catalogue import Catalogue
+
+Members = Mapping[str, Member]
 
 
 def assembly_steps(
@@ -22,8 +25,10 @@ def assembly_steps(
         steps.append(f"Print the wedges: {', '.join(wedge.id for wedge in structure.wedges)}.")
     own = {m.name: {part for part in m.carried_by if part.startswith(f"{m.name} ")} for m in mounts}
     of_one = {m.name for m in mounts}.union(*own.values())
-    starts = {member.id: member.start for member in structure.members}
-    steps += [f"J{_join(j, starts)[1:]}." for j in structure.joints if not {j.on, j.other} & of_one]
+    members = {member.id: member for member in structure.members}
+    steps += [
+        f"J{_join(j, members)[1:]}." for j in structure.joints if not {j.on, j.other} & of_one
+    ]
     steps.append(
         "Set up the subject's head form or a pointer at the datum, and check that the mount stands "
         "level and square to it."
@@ -31,7 +36,7 @@ def assembly_steps(
     for mount in mounts:
         mine = own[mount.name] | {mount.name}
         joints = [j for j in structure.joints if {j.on, j.other} & mine]
-        steps.append(f"Hang {mount.name}: {_hang(mount, joints, structure.wedges, starts)}.")
+        steps.append(f"Hang {mount.name}: {_hang(mount, joints, structure.wedges, members)}.")
         steps.append(_set(mount))
         steps.append(_check(mount))
     return tuple(f"{k}. {text}" for k, text in enumerate(steps, 1))
@@ -63,21 +68,21 @@ def _drill(plate: Plate) -> str:
 
 
 def _hang(
-    mount: CameraMount, joints: list[Joint], wedges: tuple[Wedge, ...], starts: dict[str, str]
+    mount: CameraMount, joints: list[Joint], wedges: tuple[Wedge, ...], members: Members
 ) -> str:
     """The joints of one camera in the order in which they can be made."""
     wedge = next((w.id for w in wedges if w.camera == mount.name), None)
     if wedge is None:
-        return "; ".join(_join(joint, starts) for joint in joints)
+        return "; ".join(_join(joint, members) for joint in joints)
     # On its post the wedge hides the camera's screw; the camera leaves the base screws free.
-    first = [_join(j, starts) for j in joints if wedge not in (j.on, j.other)]
+    first = [_join(j, members) for j in joints if wedge not in (j.on, j.other)]
     under = [
         f"screw {j.other} onto {j.on} from below, the screw's head in the wedge's pocket" + _with(j)
         for j in joints
         if j.on == wedge
     ]
     last = [
-        f"screw {j.other} onto {j.on} with its camera on it{_where(j, starts)}, by a straight "
+        f"screw {j.other} onto {j.on} with its camera on it{_where(j, members)}, by a straight "
         "key from above" + _with(j)
         for j in joints
         if j.other == wedge
@@ -85,16 +90,21 @@ def _hang(
     return "; ".join([*first, *under, *last, "plug in the cable last"])
 
 
-def _join(joint: Joint, starts: dict[str, str]) -> str:
+def _join(joint: Joint, members: Members) -> str:
     angle = "" if joint.angle_deg is None else f", at {joint.angle_deg:.1f} degrees"
-    return f"join {joint.other} to {joint.on}{_where(joint, starts)}{angle}" + _with(joint)
+    return f"join {joint.other} to {joint.on}{_where(joint, members)}{angle}" + _with(joint)
 
 
-def _where(joint: Joint, starts: dict[str, str]) -> str:
+def _where(joint: Joint, members: Members) -> str:
     if joint.along_mm is None:
         return ""
-    start = starts.get(joint.on, "start")
-    return f", the middle {joint.along_mm:.0f} mm from its {start}"
+    member = members.get(joint.on)
+    if member is None:
+        return f", the middle {joint.along_mm:.0f} mm from its start"
+    side = member.side_of(joint.point_mm)
+    return (f", on its {side}" if side else "") + (
+        f", the middle {joint.along_mm:.0f} mm from its {member.start}"
+    )
 
 
 def _with_length(joint: Joint, structure: Structure, catalogue: Catalogue) -> Joint:

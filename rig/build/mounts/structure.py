@@ -64,6 +64,24 @@ class Member:
             return "rear end" if y > 0.0 else "front end"
         return "end on the subject's right" if x > 0.0 else "end on the subject's left"
 
+    def side_of(self, point_mm: Floats) -> str:
+        """On which of its sides a point lies, in words; nothing for its ends and bent members."""
+        if self.radius_mm is not None or len(self.axis_mm) != 2:
+            return ""
+        first, last = self.axis_mm
+        along = (last - first) / np.linalg.norm(last - first)
+        off = point_mm - first - along * float((point_mm - first) @ along)
+        # Within a quarter of the profile it is about the middle: a joint at its end.
+        if np.linalg.norm(off) < 0.25 * min(self.size_mm):
+            return ""
+        axis = int(np.abs(off).argmax())
+        names = (
+            ("side on the subject's right", "side on the subject's left"),
+            ("side away from the subject", "side towards the subject"),
+            ("lower side", "upper side"),
+        )
+        return names[axis][int(off[axis] > 0.0)]
+
     @property
     def long_side_mm(self) -> float:
         """Length of its longer side: what it takes of a bar."""

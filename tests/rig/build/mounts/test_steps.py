@@ -148,3 +148,26 @@ def test_what_is_made_to_the_figure_is_checked_and_the_rest_set(made: bool) -> N
 def test_tapes_and_focus_are_told_to_the_millimetre() -> None:
     last = assembly_steps(structure(), (mount("cam0"),))[-1]
     assert "datum to cam0 lens 912 mm; floor to cam0 thread 1501 mm. Focus at 900 mm." in last
+
+
+@pytest.mark.parametrize(
+    ("point_mm", "words"),
+    [
+        ((300.0, 0.0, 10.0), "upper side"),
+        ((300.0, 0.0, -40.0), "lower side"),
+        ((300.0, -10.0, 1.0), "side away from the subject"),
+        ((300.0, 15.0, 0.0), "side towards the subject"),
+        ((800.0, 0.0, 0.0), ""),
+    ],
+)
+def test_a_joint_says_on_which_side_of_its_member_it_is(
+    point_mm: tuple[float, float, float], words: str
+) -> None:
+    rail = member("rail", 800.0)
+    assert rail.side_of(np.array(point_mm)) == words
+    joint = Joint("j1", "rail", "cam0 plate", np.array(point_mm), 300.0)
+    steps = assembly_steps(
+        structure(members=(rail,), joints=(joint,)), (mount("cam0", "cam0 plate"),)
+    )
+    said = f", on its {words}, the middle 300 mm from its end" if words else ", the middle 300 mm"
+    assert f"to rail{said}" in " ".join(steps)
