@@ -39,6 +39,9 @@ STEP_SHARE = 0.035
 APART_SHARE = 0.35
 """By how much members and each camera with what holds it move away from the rig's middle."""
 
+WHOLE_HEIGHT = 1.45
+"""The height of a scene's box that is seen whole; a higher rig is looked at from farther off."""
+
 MOST_HEAD_FACES = 9_000
 
 
@@ -65,10 +68,18 @@ def plan_figure(
         ways[name] = moves
     # Aimed below its middle: the nearest axis's title is at the lower edge of the scene.
     # A plate hides its cameras from behind; it is worked on from the subject's side.
-    figure.update_layout(**scene_layout(0.85, aim_z=-0.18, behind=not plan.structure.plates))
+    zoom = 0.85 * min(1.0, WHOLE_HEIGHT / _box_height(solids))
+    figure.update_layout(**scene_layout(zoom, aim_z=-0.14, behind=not plan.structure.plates))
     legend = {"orientation": "h", "x": 0.0, "y": 0.0, "yanchor": "top", "bgcolor": "rgba(0,0,0,0)"}
     figure.update_layout(legend=legend, margin={"l": 0, "r": 0, "t": 0, "b": 60})
     return figure, ways
+
+
+def _box_height(solids: Sequence[Solid]) -> float:
+    """Height of the scene's box, which is drawn in proportion and with a volume of one."""
+    corners = np.concatenate([s.corners_mm for s in solids])
+    spans = np.ptp(corners, axis=0)
+    return float(spans[2] / np.cbrt(spans.prod()))
 
 
 def _kind_trace(kind: str, solids: list[Solid], apart: Floats) -> tuple[go.Mesh3d, str, Moves]:
