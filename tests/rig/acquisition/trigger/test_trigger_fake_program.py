@@ -86,7 +86,7 @@ def test_faults_that_are_none(words: str) -> None:
 
 def test_places_that_cannot_be(tmp_path: Path) -> None:
     (tmp_path / "taken").write_text("a file of somebody")
-    with pytest.raises(InputError, match="no symbolic link"):
+    with pytest.raises(InputError, match="no link of a fake box"):
         start_fake(link=tmp_path / "taken")
     assert (tmp_path / "taken").read_text() == "a file of somebody"
     with pytest.raises(InputError, match="either a link or a port"):
