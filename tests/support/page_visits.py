@@ -68,6 +68,6 @@ class Visit:
         rules = {"runOnly": {"type": "tag", "values": ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa"]}}
         found = Axe().run(self.page, options={**rules, "iframes": False})
         told = [f"{v['id']}: {v['nodes'][0]['html'][:200]}" for v in found.response["violations"]]
-        assert told == []
-        assert self.faults == []
+        assert told == [], told
+        assert self.faults == [], self.faults
         assert self.foreign == []

@@ -44,11 +44,10 @@ export function live(rig, signal) {
     for (const one of wanted) {
       if (!element.open || signal.aborted || document.hidden) return;
       try {
-        await one.look(targets.value, signal);
+        if (!(await one.look(targets.value, signal))) resting = "The rig is at work; the live view goes on when it has ended.";
       } catch (error) {
         if (signal.aborted) return;
-        if (error.problem?.type === "/problems/conflict/rig-busy") resting = "The rig is at work; the live view goes on when it has ended.";
-        else one.fail(error.message);
+        one.fail(error.message);
       }
     }
     told.textContent = resting;
@@ -96,6 +95,7 @@ function sight(rig, name) {
   async function look(targets, signal) {
     const asked = new URLSearchParams(place ? { x: place.x, y: place.y } : targets ? { target_set_id: targets } : {});
     const seen = await get(`${path}?${asked}`, signal);
+    if (seen === null) return false;
     picture.src = at(seen.links.picture);
     await picture.decode().catch(() => {});
     frame.style.aspectRatio = `${seen.image_size_px[0]} / ${seen.image_size_px[1]}`;
@@ -106,6 +106,7 @@ function sight(rig, name) {
     aim.textContent = seen.aim?.text ?? "No design tells where it should look.";
     aim.className = `aim ${seen.aim?.found_px ? (seen.aim.text.includes(":") ? "warn" : "good") : ""}`;
     drawn(marks, seen.aim);
+    return true;
   }
 
   const fail = (words) => { wrong.textContent = words; };

@@ -102,7 +102,7 @@ def test_a_session_is_looked_at_and_proven(visits: tuple[Visit, Visit]) -> None:
     other.page.get_by_role("link", name="anna").click()
     other.page.locator(".sheet img").nth(1).wait_for()
     other.press("Prove it whole")
-    other.see("Whole: 1 capture,")
+    other.see("Whole: 2 captures,")
     other.sound()
 
 
