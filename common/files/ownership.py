@@ -56,6 +56,15 @@ def foreign(folder: Path, but: Collection[Path] = ()) -> str | None:
     return None
 
 
+def unchanged(path: Path) -> bool | None:
+    """Whether a file is as the list in its folder says; None where there is no list."""
+    listed = _listed(path.parent)
+    if listed is None:
+        return None
+    plain = path.is_file() and not path.is_symlink()
+    return plain and listed.get(path.name) == _sha256(path)
+
+
 def _listed(folder: Path) -> dict[str, str] | None:
     """The list; None where there is none, or one that is not whole."""
     marker = folder / MARKER

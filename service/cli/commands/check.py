@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Annotated
 
@@ -115,10 +116,15 @@ def _targets_beside(reference: Path) -> Path:
 def _earlier(history: Path | None) -> dict[str, Path]:
     from common.errors import InputError
 
-    if history is None or not history.exists():
+    if history is None:
         return {}
-    if not history.is_dir():
-        raise InputError("history-folder", f"{history} is a file", "give a folder as --history")
+    for place in (history, *history.parents):
+        if os.path.lexists(place) and not place.is_dir():
+            raise InputError(
+                "history-folder", f"{place} is no folder", "give a folder as --history"
+            )
+    if not history.exists():
+        return {}
     _refuse_foreign_page(history / HISTORY_PAGE)
     found = sorted(history.glob("check-*.json"))
     return {f"check-{number}": path for number, path in enumerate(found)}
@@ -131,19 +137,26 @@ def _refuse_foreign_page(page: Path) -> None:
     if page.is_symlink() or (page.exists() and not _is_ours(page)):
         raise ConflictError(
             "history-page",
-            f"{page} was not written by this program",
+            f"{page} was not written by this program, or was changed since",
             "give another folder as --history, or move it away",
         )
 
 
 def _is_ours(page: Path) -> bool:
+    from common.files.ownership import unchanged
+
     if not page.is_file():
         return False
+    listed = unchanged(page)
+    if listed is not None:
+        return listed
+    # Histories that began before there was a list.
     with page.open("rb") as file:
         return b'name="generator" content="Rigwright"' in file.read(4096)
 
 
 def _add_to_history(out: Path, history: Path, made_utc: str) -> None:
+    from common.files.ownership import files_of, mark
     from common.files.writing import write_whole
 
     history.mkdir(parents=True, exist_ok=True)
@@ -151,7 +164,9 @@ def _add_to_history(out: Path, history: Path, made_utc: str) -> None:
     write_whole(_free(history, f"check-{stamp}"), (out / "check.json").read_bytes())
     page = out / HISTORY_PAGE
     if page.exists():
-        write_whole(history / HISTORY_PAGE, page.read_bytes(), overwrite=True)
+        shown = history / HISTORY_PAGE
+        write_whole(shown, page.read_bytes(), overwrite=True)
+        mark(history, [path for path in files_of(history).values() if path != shown])
 
 
 def _free(folder: Path, stem: str) -> Path:
