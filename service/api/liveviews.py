@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated
 from urllib.parse import quote
 
 from fastapi import APIRouter, Query, Response
@@ -10,7 +10,7 @@ from fastapi import APIRouter, Query, Response
 from common.errors import ConflictError, InputError
 from service.api.context import ServiceDep
 from service.api.models import problems
-from service.api.responses import a_file
+from service.api.responses import Responses, a_file
 from service.api.rigs import rig_path
 from service.api.targetsets import target_file
 from service.stations.liveview import Asked, LiveLook, live_jpeg, live_look
@@ -18,9 +18,7 @@ from service.stations.liveview import Asked, LiveLook, live_jpeg, live_look
 router = APIRouter(tags=["rigs"])
 _PATH = "/v1/rigs/{rig}/cameras/{camera}/preview"
 Share = Annotated[float | None, Query(ge=0.0, le=1.0, allow_inf_nan=False)]
-_RESTING: dict[int | str, dict[str, Any]] = {
-    204: {"description": "The rig is at work: ask again when it has ended."}
-}
+_RESTING: Responses = {204: {"description": "The rig is at work: ask again when it has ended."}}
 
 
 def _resting(error: ConflictError) -> Response:

@@ -39,8 +39,9 @@ STEP_SHARE = 0.035
 APART_SHARE = 0.35
 """By how much members and each camera with what holds it move away from the rig's middle."""
 
-WHOLE_HEIGHT = 1.45
-"""The height of a scene's box that is seen whole; a higher rig is looked at from farther off."""
+WHOLE_HEIGHT_RATIO = 1.45
+"""Height of a scene's box over the cube root of its volume that is seen whole; a higher rig is
+looked at from farther off."""
 
 MOST_HEAD_FACES = 9_000
 
@@ -68,7 +69,7 @@ def plan_figure(
         ways[name] = moves
     # Aimed below its middle: the nearest axis's title is at the lower edge of the scene.
     # A plate hides its cameras from behind; it is worked on from the subject's side.
-    zoom = 0.85 * min(1.0, WHOLE_HEIGHT / _box_height(solids))
+    zoom = 0.85 * min(1.0, WHOLE_HEIGHT_RATIO / _box_height(solids))
     figure.update_layout(**scene_layout(zoom, aim_z=-0.14, behind=not plan.structure.plates))
     legend = {"orientation": "h", "x": 0.0, "y": 0.0, "yanchor": "top", "bgcolor": "rgba(0,0,0,0)"}
     figure.update_layout(legend=legend, margin={"l": 0, "r": 0, "t": 0, "b": 60})
