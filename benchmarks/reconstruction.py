@@ -27,7 +27,7 @@ RADIUS_MM = 95.0
 
 def main() -> None:
     """Photograph, reconstruct, compare, print."""
-    chosen = _arguments()
+    chosen = arguments(__doc__).parse_args()
     cameras = read_design(chosen.design).cameras
     head = HeadSettings(
         scan=chosen.head,
@@ -64,13 +64,14 @@ def main() -> None:
     print(f"| peak memory, photographing included | {peak:.0f} MiB |")
 
 
-def _arguments() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=__doc__)
+def arguments(description: str | None) -> argparse.ArgumentParser:
+    """Takes a design, and the head that its cameras photograph."""
+    parser = argparse.ArgumentParser(description=description)
     parser.add_argument("--design", type=Path, required=True)
     parser.add_argument("--head", type=Path)
     parser.add_argument("--texture", type=Path)
     parser.add_argument("--displacement", type=Path)
-    return parser.parse_args()
+    return parser
 
 
 def _views(studio: Studio) -> list[View]:

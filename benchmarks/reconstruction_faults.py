@@ -10,12 +10,12 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import cv2
 import numpy as np
 
 from benchmarks.pages import table
+from benchmarks.reconstruction import arguments
 from common.errors import RigwrightError
 from evaluation.comparison.distances import Reference
 from evaluation.reconstruction.reconstructing import (
@@ -108,7 +108,9 @@ FAULTS: dict[str, Callable[[Bench], Images]] = {
 
 def main() -> None:
     """Photograph, spoil, reconstruct, print."""
-    chosen = _arguments()
+    parser = arguments(__doc__)
+    parser.add_argument("--only", action="append", default=[])
+    chosen = parser.parse_args()
     bench, truth = _bench(chosen)
     rows = [
         _row(name, bench, truth, make)
@@ -117,16 +119,6 @@ def main() -> None:
     ]
     head = ("what is wrong", "what is said", "points", "rms mm", "median mm", "within 1 mm")
     print(table(head, rows))
-
-
-def _arguments() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--design", type=Path, required=True)
-    parser.add_argument("--head", type=Path)
-    parser.add_argument("--texture", type=Path)
-    parser.add_argument("--displacement", type=Path)
-    parser.add_argument("--only", action="append", default=[])
-    return parser.parse_args()
 
 
 def _bench(chosen: argparse.Namespace) -> tuple[Bench, Reference]:

@@ -23,7 +23,7 @@ from solver.pool import StartJob, run_all
 from solver.problem import Problem, camera_at
 from solver.quality import evaluate
 from solver.refinement import optimality_error, refine
-from solver.result import Design, Quality, Relaxation, SolverReport, StartReport, Status
+from solver.result import NOBODY, Design, Quality, Relaxation, SolverReport, StartReport, Status
 from solver.search.exchange import search_networks
 from solver.standing import check_angles, check_places
 from solver.starts import kmeans_start, strips, turned
@@ -209,7 +209,7 @@ def _told_at_once(request: Request, told: Hopeless, began: float) -> Design:
     problem = request.problem(placed)
     quality = evaluate(subject, problem.cameras, request.limits, problem.anchor)
     report = SolverReport(
-        engine="none",
+        engine=NOBODY,
         status=Status.INFEASIBLE,
         why_stopped=f"nothing was searched: {told}",
         kkt_error=np.nan,
@@ -221,8 +221,7 @@ def _told_at_once(request: Request, told: Hopeless, began: float) -> Design:
         conflicts=missed(quality, told.families),
         contradiction=str(told),
     )
-    begun = (*problem.cameras,)  # another tuple: a rig whose start is its design stands already
-    return Design(problem.cameras, quality, begun, quality, request.limits, report)
+    return Design(problem.cameras, quality, problem.cameras, quality, request.limits, report)
 
 
 class _Teller:

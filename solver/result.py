@@ -135,6 +135,10 @@ class Quality:
         return tuple(row for row in self.constraints if not row.satisfied)
 
 
+NOBODY = "none"
+"""The engine of a design in which nothing was optimised."""
+
+
 class Status(StrEnum):
     """How a design ended."""
 
@@ -239,4 +243,4 @@ class Design:
     @property
     def stands(self) -> bool:
         """Whether the rig was there already, and nothing was placed."""
-        return self.cameras is self.start_cameras
+        return self.solver.engine == NOBODY and self.solver.contradiction is None

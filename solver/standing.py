@@ -12,7 +12,7 @@ from geometry.raycast import Occluder
 from geometry.subject import Subject
 from solver.limits import Limits
 from solver.quality import evaluate
-from solver.result import Design, SolverReport, Status
+from solver.result import NOBODY, Design, SolverReport, Status
 
 _LOOKS = 200
 _INSIDE = 0.5
@@ -36,7 +36,7 @@ def as_it_stands(
     check_places(subject, cameras, limits)
     quality = evaluate(subject, cameras, limits)
     report = SolverReport(
-        engine="none",
+        engine=NOBODY,
         status=Status.CONVERGED if quality.feasible else Status.INFEASIBLE,
         why_stopped="no camera was to be placed, so the rig is told of as it stands",
         kkt_error=np.nan,

@@ -8,16 +8,16 @@ import shutil
 import stat
 import tempfile
 from collections.abc import Callable, Collection, Iterable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 
 from common.errors import ConflictError, InputError
 from common.files.lock import KernelLock, LockHeldError, lock_folder
 from common.files.ownership import MARKER, files_of, foreign, mark
 from common.files.placing import NOT_REPLACED, put_in_place
+from common.files.writing import FULL, missing, remove_empty
 
-_FULL = (errno.ENOSPC, errno.EDQUOT)
-_OF_THE_DISK = (*_FULL, errno.EIO, errno.EROFS, errno.EFBIG)
+_OF_THE_DISK = (*FULL, errno.EIO, errno.EROFS)
 _ANOTHER = "give another --out, or move it away yourself"
 
 
@@ -96,7 +96,7 @@ def grown_folder(
     """
     with _told(out):
         _refuse_place(out)
-        existed, held, made = out.exists(), _holds_something(out), _missing_parents(out)
+        existed, held, made = out.exists(), _holds_something(out), missing(out.parent)
         if held:
             _refuse_other_work(out, kept, force=force, same=same)
         _refuse_loss(out, spare())
@@ -116,7 +116,7 @@ def grown_folder(
         lock.release()
         if not held and not files_of(out):
             (out / MARKER).unlink(missing_ok=True)
-            _remove_empty([] if existed else [out, *made])
+            remove_empty([] if existed else [out, *made])
 
 
 def _begun(out: Path) -> KernelLock:
@@ -135,11 +135,7 @@ def _refuse_other_work(out: Path, kept: str, *, force: bool, same: Callable[[], 
     """Refuse a folder that is not ours, or holds results of another work."""
     begun = (out / MARKER).is_file() and (not files_of(out) or (out / kept).is_dir())
     if not force and not (begun and same()):
-        raise ConflictError(
-            "out-not-empty",
-            f"the folder {out} is not empty",
-            NOT_REPLACED,
-        )
+        raise ConflictError("out-not-empty", f"the folder {out} is not empty", NOT_REPLACED)
     _refuse_foreign(out, out, _all_in(out / kept))
 
 
@@ -153,16 +149,6 @@ def _clear(out: Path, kept: str) -> None:
     for path in sorted(out.rglob("*"), reverse=True):
         if path.relative_to(out).parts[0] != kept and path.name != MARKER:
             path.rmdir() if path.is_dir() else path.unlink()
-
-
-def _missing_parents(out: Path) -> list[Path]:
-    return [parent for parent in out.parents if not parent.exists()]
-
-
-def _remove_empty(folders: Iterable[Path]) -> None:
-    for folder in folders:
-        with suppress(OSError):
-            folder.rmdir()
 
 
 def refuse_others(out: Path, own: Collection[str]) -> None:
@@ -194,7 +180,7 @@ def _told(out: Path, only: Collection[int] = ()) -> Iterator[None]:
             "out-unwritable",
             f"cannot write to {out} ({(error.strerror or 'unwritable').lower()})",
             "free space on the disk, or give another --out"
-            if error.errno in _FULL
+            if error.errno in FULL
             else "give another --out",
         ) from error
 
@@ -207,14 +193,14 @@ def _half_made(out: Path) -> Iterator[Path]:
     ``out`` may be there, where it could not be put back.
     """
     with _told(out):
-        made = _missing_parents(out)
+        made = missing(out.parent)
         partial = _beside(out)
     try:
         (partial / "files").mkdir()
         yield partial / "files"
     finally:
         shutil.rmtree(partial / "files", ignore_errors=True)
-        _remove_empty([partial, *([] if out.exists() else made)])
+        remove_empty([partial, *([] if out.exists() else made)])
 
 
 def _refuse_place(out: Path) -> None:

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
-from common.errors import ConflictError
+from common.errors import ConflictError, InputError
 from common.files.ownership import foreign
 
 NOT_REPLACED = "give another --out, or --force to replace results that are in it"
@@ -28,8 +28,8 @@ def put_in_place(new: Path, out: Path, may_go: Callable[[Path], None] | None) ->
     What stood in ``out`` is removed where ``may_go`` agrees. It is asked once that is out of
     everybody's sight, with the place where it is now, and raises where it has to stay: then it
     stands in ``out`` again. Without ``may_go`` nothing but an empty folder is replaced. Raises
-    :class:`ConflictError` then, and :class:`OSError`. What could not be moved back, for whatever
-    reason, is left beside ``new`` under the name ``old``.
+    :class:`ConflictError` then, and :class:`OSError`. What cannot be moved back, for whatever
+    reason, is left beside ``new`` under the name ``old``; :class:`InputError` says where.
     """
     _dress(new, out)
     if not (out.is_dir() and any(out.iterdir())):
@@ -43,12 +43,23 @@ def put_in_place(new: Path, out: Path, may_go: Callable[[Path], None] | None) ->
     try:
         may_go(old)
     except BaseException:
-        _exchange(old, out)
+        _put_back(old, out)
         # Both were in plain view for a moment: what somebody laid into the new one is kept too.
         if foreign(old) is None:
             old.rename(new)
         raise
     shutil.rmtree(old, ignore_errors=True)
+
+
+def _put_back(old: Path, out: Path) -> None:
+    try:
+        _exchange(old, out)
+    except OSError as error:
+        raise InputError(
+            "out-unwritable",
+            f"what stood in {out} could not be put back ({(error.strerror or str(error)).lower()})",
+            f"it is whole in {old}: move it where you want it",
+        ) from error
 
 
 def _dress(new: Path, out: Path) -> None:

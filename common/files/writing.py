@@ -13,7 +13,7 @@ from pathlib import Path
 from common.errors import ConflictError, InputError
 
 LARGEST_BYTES = 200_000_000
-_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _NO_LINKS = (errno.EPERM, errno.EOPNOTSUPP, errno.ENOSYS, errno.EMLINK)
 
 
@@ -86,7 +86,11 @@ def put_new(part: Path, place: Path) -> None:
             raise
         # A file system without hard links: the name is taken first, and only then replaced.
         place.open("xb").close()
-        part.replace(place)
+        try:
+            part.replace(place)
+        except OSError:
+            place.unlink()
+            raise
         return
     part.unlink()
 
@@ -97,16 +101,22 @@ def with_parents(folder: Path) -> Iterator[None]:
 
     What has been put into them meanwhile stays, and they with it. Raises :class:`OSError`.
     """
-    made = [above for above in (folder, *folder.parents) if not os.path.lexists(above)]
+    made = missing(folder)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         yield
     except BaseException:
-        _remove_empty(made)
+        remove_empty(made)
         raise
 
 
-def _remove_empty(folders: Iterable[Path]) -> None:
+def missing(folder: Path) -> list[Path]:
+    """``folder`` and those above it that are not there, the innermost first."""
+    return [above for above in (folder, *folder.parents) if not os.path.lexists(above)]
+
+
+def remove_empty(folders: Iterable[Path]) -> None:
+    """Remove those of some folders in which nothing is, in this order."""
     for folder in folders:
         with suppress(OSError):
             folder.rmdir()
@@ -124,7 +134,7 @@ def _taken(path: Path) -> ConflictError:
 
 def _unwritable(path: Path, error: OSError) -> InputError:
     remedy = "make its folder writable, or give another"
-    if error.errno in _FULL:
+    if error.errno in FULL:
         remedy = "free some space, or give another folder"
     if error.errno == errno.ENAMETOOLONG:
         remedy = "give a shorter name"

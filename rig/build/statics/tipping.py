@@ -9,11 +9,12 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull
 
+from common.errors import InputError
 from geometry.arrays import Floats
 from rig.build.mounts.plan import GRAVITY_M_S2, Stance
 from rig.build.mounts.settings import CameraMount
 from rig.build.mounts.structure import Structure
-from rig.build.parts.bill import density_g_per_cm3
+from rig.build.parts.bill import plate_mass_g
 from rig.build.statics.framing import FOOT
 from rig.build.statics.materials import member_section
 from rig.build.statics.weights import Masses, weights
@@ -97,11 +98,16 @@ def _mass(
             pieces.append((per_mm * member.length_mm, member.axis_mm.mean(axis=0)))
     for plate in structure.plates:
         if plate.id in body:
-            area = float(ConvexHull(plate.outline_mm).volume)
-            density = density_g_per_cm3(plate.material) or 0.0
+            mass_g = plate_mass_g(plate)
+            if mass_g is None:
+                raise InputError(
+                    "plate-mass",
+                    f"the density of plate {plate.id}'s material {plate.material!r} is not known",
+                    "name a material that is, such as aluminium",
+                )
             middle = np.append(plate.outline_mm.mean(axis=0), -plate.thickness_mm / 2.0)
             at = plate.rig_from_plate[:3, :3] @ middle + plate.rig_from_plate[:3, 3]
-            pieces.append((area * plate.thickness_mm * density * 1e-6, at))
+            pieces.append((mass_g * 1e-3, at))
     carried = {m.name for m in mounts if body & set(m.carried_by)}
     joints = {j.id for j in structure.joints if body & {j.on, j.other}}
     pieces += [

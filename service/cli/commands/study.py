@@ -60,11 +60,11 @@ def study(
     with one_line_errors():
 
         @cache
-        def asked() -> tuple[StudyRequest, dict[str, Path]]:
+        def asked() -> tuple[StudyRequest, dict[str, Path], list[Path]]:
             return _read(plan)
 
         def same() -> bool:
-            request, inputs = asked()
+            request, inputs, _ = asked()
             heads, _ = heads_of(request.study, request.head_names, inputs)
             identity = study_identity(request.study, request.rigs, heads)
             return identity_in(out / "study.json") in (None, identity)
@@ -72,9 +72,9 @@ def study(
         kept = str((out / UNITS).absolute())
         run = RunContext(workers=processes(workers), cache=kept, cluster=dask)
         with grown_folder(
-            out, UNITS, force=force, ours=is_unit, same=same, spare=lambda: _named(plan)
+            out, UNITS, force=force, ours=is_unit, same=same, spare=lambda: asked()[2]
         ) as folder:
-            request, inputs = asked()
+            request, inputs, _ = asked()
             result = run_task(STUDY, request, inputs, folder, run)
         files = {
             name: path for name, path in files_of(out).items() if not name.startswith(f"{UNITS}/")
@@ -96,31 +96,23 @@ def _why(result: StudyResult) -> str:
     )
 
 
-def _named(plan: Path) -> list[Path]:
-    """The study file, and all that it names."""
-    from rig.study.studyfile import read_study_file
-    from service.cli.running import require_files
-
-    require_files([plan])
-    file = read_study_file(plan)
-    return [plan, *(plan.parent / name for name in (*file.rigs, *file.heads))]
-
-
-def _read(plan: Path) -> tuple[StudyRequest, dict[str, Path]]:
-    """The request, and the scans by role."""
+def _read(plan: Path) -> tuple[StudyRequest, dict[str, Path], list[Path]]:
+    """The request, the scans by role, and all files that are read for it."""
     from rig.specification.rigfile import read_rig_file
     from rig.study.heads import ROLE
     from rig.study.studyfile import read_study_file
     from service.cli.running import require_files
     from service.kinds.study import StudyRequest
 
-    require_files(_named(plan))
+    require_files([plan])
     file = read_study_file(plan)
     rigs = [plan.parent / name for name in file.rigs]
     heads = [plan.parent / name for name in file.heads]
+    require_files([*rigs, *heads])
     request = StudyRequest(
         study=file.study(),
         rigs=[read_rig_file(path) for path in rigs],
         head_names=[path.name for path in heads],
     )
-    return request, {ROLE.format(number): path for number, path in enumerate(heads, 1)}
+    inputs = {ROLE.format(number): path for number, path in enumerate(heads, 1)}
+    return request, inputs, [plan, *rigs, *heads]

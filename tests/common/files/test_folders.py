@@ -449,11 +449,12 @@ def test_what_stood_there_is_never_lost_when_it_cannot_be_put_back(
     monkeypatch.setattr(placing, "_exchange", once)
     out = tmp_path / "out"
     ours(out)
-    with pytest.raises((ConflictError, InputError)), new_folder(out, force=True) as folder:
+    with pytest.raises(InputError) as told, new_folder(out, force=True) as folder:
         put(folder, new_json="{}")
         put(out, notes_txt="mine")
     (kept,) = (p for p in tmp_path.rglob("notes.txt"))
     assert kept.read_text() == "mine"
+    assert f"it is whole in {kept.parent}" in str(told.value)
 
 
 @pytest.mark.parametrize("at_once", [True, False])

@@ -111,3 +111,22 @@ def test_folders_made_for_nothing_go_again_and_only_those(tmp_path: Path) -> Non
             raise ZeroDivisionError
         found = sorted(p.relative_to(tmp_path).as_posix() for p in tmp_path.rglob("*"))
         assert found == (left if put is None else sorted([*left, "a/b/note"]))
+
+
+def test_a_disk_without_links_that_fails_at_the_end_leaves_no_empty_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    part, place = tmp_path / "part", tmp_path / "place"
+    part.write_text("whole")
+
+    def no_links(*_: object, **__: object) -> None:
+        raise OSError(errno.EPERM, "no links here")
+
+    def fails(*_: object) -> None:
+        raise OSError(errno.EIO, "input/output error")
+
+    monkeypatch.setattr(os, "link", no_links)
+    monkeypatch.setattr(Path, "replace", fails)
+    with pytest.raises(OSError, match="input/output"):
+        put_new(part, place)
+    assert [p.name for p in tmp_path.iterdir()] == ["part"]

@@ -41,6 +41,22 @@ def read(address: str) -> object:
         return json.load(answer)
 
 
+def refused(visit: Visit, address: str) -> list[str]:
+    """What the browser posts to ``address`` from now on, each time told that too many wait."""
+    problem = {"type": "/problems/conflict/queue-full", "detail": "too many wait; ask later"}
+    bodies: list[str] = []
+
+    def ask(route: Route) -> None:
+        if route.request.method == "GET":
+            route.continue_()
+            return
+        bodies.append(str(route.request.post_data))
+        route.fulfill(status=503, json=problem)
+
+    visit.page.route(address, ask)
+    return bodies
+
+
 @pytest.mark.slow
 def test_a_capture_is_seen_by_everybody_at_the_rig(
     visits: tuple[Visit, Visit], address: str
@@ -131,18 +147,8 @@ def test_a_surface_is_asked_for_with_what_was_chosen(visits: tuple[Visit, Visit]
     one, _ = visits
     design = {"id": "d1", "status": "completed", "created_at": "2026-01-31T12:00:00Z"}
     listed = {"items": [design | {"result": {"name": "Seven"}}], "next": None}
-    refused = {"type": "/problems/conflict/queue-full", "detail": "too many wait; ask later"}
-    bodies: list[str] = []
-
-    def ask(route: Route) -> None:
-        if route.request.method == "GET":
-            route.continue_()
-            return
-        bodies.append(str(route.request.post_data))
-        route.fulfill(status=503, json=refused)
-
     one.page.route("**/v1/designs?*", lambda route: route.fulfill(json=listed))
-    one.page.route("**/v1/reconstructions", ask)
+    bodies = refused(one, "**/v1/reconstructions")
     one.go("Surface")
     one.page.get_by_label("Capture", exact=True).locator("option").first.wait_for(state="attached")
     one.sound()
@@ -163,20 +169,10 @@ def test_a_study_is_asked_for_with_what_was_chosen(visits: tuple[Visit, Visit]) 
         {"id": name, "filename": f"{name}.ply", "extents_mm": [1, 1, 1], "notes": []}
         for name in ("anna", "bert")
     ]
-    refused = {"type": "/problems/conflict/queue-full", "detail": "too many wait; ask later"}
-    bodies: list[str] = []
-
-    def ask(route: Route) -> None:
-        if route.request.method == "GET":
-            route.continue_()
-            return
-        bodies.append(str(route.request.post_data))
-        route.fulfill(status=503, json=refused)
-
     one.page.route(
         "**/v1/scans?*", lambda route: route.fulfill(json={"items": scans, "next": None})
     )
-    one.page.route("**/v1/studies", ask)
+    bodies = refused(one, "**/v1/studies")
     one.go("Studies")
     one.page.get_by_label("bert.ply").check()
     one.page.get_by_label("Cameras", exact=True).fill("3, 4 5")

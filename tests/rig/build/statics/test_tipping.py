@@ -13,7 +13,7 @@ from rig.build.mounts.clashes import find_clashes
 from rig.build.mounts.plan import Give, Sag, Stance
 from rig.build.mounts.planfile import plan_document, plan_from_mapping
 from rig.build.mounts.solids import bar
-from rig.build.mounts.structure import Joint, Member, PlacedPart, Structure
+from rig.build.mounts.structure import Joint, Member, PlacedPart, Plate, Structure
 from rig.build.page.stiffness import stiffness
 from rig.build.statics.steadying import settled_stances, steadied
 from rig.build.statics.stiffening import Stiffened
@@ -148,3 +148,14 @@ def test_the_page_shows_what_tips() -> None:
     sag = Sag("c1", np.zeros(3), 0.1, 0.1, 0.1, (Give("tilt", "deg", 0.1, 0.5, 1.0),))
     page = stiffness(replace(tslot_plan(2), sags=(sag,), stances=found))
     assert f"<b>{found[0].tips_n:.0f}</b>" in page and "left foot, right foot" in page
+
+
+def test_a_plate_of_unknown_material_is_told_and_not_taken_as_weightless() -> None:
+    outline = np.array([[0.0, 0.0], [400.0, 0.0], [400.0, 300.0], [0.0, 300.0]])
+    plate = Plate("board", "unobtainium", 8.0, np.eye(4), outline, ())
+    joint = Joint("j9", "post", "board", np.zeros(3))
+    made = stand()
+    made = replace(made, plates=(plate,), joints=(*made.joints, joint))
+    found, notes = settled_stances(made, (), DATUM, MASSES)
+    assert found == ()
+    assert "unobtainium" in notes[0] and "not known" in notes[0]
