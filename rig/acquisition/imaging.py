@@ -49,7 +49,7 @@ def shrunk(pixels: Image, most_px: int) -> Image:
     if scale == 1.0:
         return pixels
     size = (max(1, round(width * scale)), max(1, round(height * scale)))
-    return cv2.resize(pixels, size, interpolation=cv2.INTER_AREA)  # type: ignore[return-value]  # as given
+    return cv2.resize(pixels, size, interpolation=cv2.INTER_AREA)  # type: ignore[return-value]  # its types forget the depth
 
 
 def smoothed(grey: NDArray[np.float32], sigma_px: float) -> NDArray[np.float32]:

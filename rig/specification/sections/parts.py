@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, TypeGuard
 
 from common.errors import InputError
 from rig.catalogue import Catalogue, CatalogueCamera, CatalogueLens, fit, load_catalogue
@@ -64,16 +64,18 @@ def _values(
     return merged
 
 
-def _is_number(value: object) -> bool:
+def _is_number(value: object) -> TypeGuard[float]:
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def _extent_mm(values: Mapping[str, Any], pitch_um: object) -> tuple[float, float] | None:
     """Width and height of the image on the sensor; None while either is not a number yet."""
     size = values.get("image_size_px")
-    if not isinstance(size, list) or len(size) != 2 or not all(map(_is_number, [*size, pitch_um])):
+    if not isinstance(size, list) or len(size) != 2 or not all(map(_is_number, size)):
         return None
-    pitch_mm = float(pitch_um) / MICROMETRES  # type: ignore[arg-type]
+    if not _is_number(pitch_um):
+        return None
+    pitch_mm = pitch_um / MICROMETRES
     return size[0] * pitch_mm, size[1] * pitch_mm
 
 
@@ -114,16 +116,16 @@ def _check_sensor(merged: Mapping[str, Any], body: CatalogueCamera) -> None:
 def _check_lens(merged: Mapping[str, Any], lens: CatalogueLens) -> None:
     f_number, focal = merged.get("f_number"), merged.get("focal_length_mm")
     low, high = lens.f_number_min or 0.0, lens.f_number_max or math.inf
-    if _is_number(f_number) and not low - 0.05 <= f_number <= high + 0.05:  # type: ignore[operator]
+    if _is_number(f_number) and not low - 0.05 <= f_number <= high + 0.05:
         ends = f"from {low:g} to {high:g}" if high < math.inf else f"{low:g} and up"
-        nearest = low if f_number < low else high  # type: ignore[operator]
+        nearest = low if f_number < low else high
         raise InputError(
             "value",
             f"f_number is {f_number:g}, but {lens.id} has {ends}",
             f"give {nearest:g} or choose another lens",
         )
     nominal = lens.focal_length_mm
-    if _is_number(focal) and abs(focal / nominal - 1.0) > FOCAL_SLACK:  # type: ignore[operator]
+    if _is_number(focal) and abs(focal / nominal - 1.0) > FOCAL_SLACK:
         raise InputError(
             "value",
             f"focal_length_mm is {focal:g}, but {lens.id} has {nominal:g}",
