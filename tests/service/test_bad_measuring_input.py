@@ -354,7 +354,7 @@ def test_references_that_are_none(folder: Path) -> None:
     assert "the folder empty holds no calibration.json" in line("--reference", "empty")
     (folder / "history").write_text("")
     reference = ("--reference", "calibration")
-    assert "history is a file" in line(*reference, "--history", "history")
+    assert "history is no folder; give a folder" in line(*reference, "--history", "history")
     (folder / "checks").mkdir()
     (folder / "checks" / "check-1.json").write_text("{")
     assert "check-1.json is not JSON" in line(*reference, "--history", "checks")
