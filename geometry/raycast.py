@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import cast
 
 import numpy as np
@@ -29,6 +30,12 @@ class Occluder:
     def none(cls) -> Occluder:
         """An occluder that hides nothing."""
         return cls(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
+
+    @cached_property
+    def extent_mm(self) -> tuple[Floats, Floats]:
+        """Least and largest coordinates of the vertices, (3,) each; infinite without any."""
+        low = self.vertices_mm.min(axis=0, initial=np.inf)
+        return frozen(low), frozen(self.vertices_mm.max(axis=0, initial=-np.inf))
 
     def _build(self) -> object | None:
         if len(self.faces) == 0:

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+from scipy.spatial import ConvexHull, QhullError
 
 from common.errors import InputError
-from geometry.arrays import Floats, frozen
+from geometry.arrays import Bools, Floats, frozen
+
+HULLS_KEPT = 128
+"""A camera that is moved a little sees the same points: few sets are asked for again and again."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,3 +58,29 @@ class SurfacePoints:
     def subset(self, keep: np.ndarray) -> SurfacePoints:
         """The points selected by a mask or index array."""
         return SurfacePoints(self.points_mm[keep], self.normals[keep])
+
+    @cached_property
+    def _corners(self) -> dict[bytes, Floats]:
+        return {}
+
+    def corners_mm(self, of: Bools) -> Floats:
+        """Corners (m, 3) of the convex hull of the points of a mask (N,), in their order.
+
+        Flat or tiny sets are returned whole.
+        """
+        key = np.packbits(of).tobytes()
+        found = self._corners.get(key)
+        if found is None:
+            if len(self._corners) >= HULLS_KEPT:
+                self._corners.clear()
+            found = self._corners[key] = frozen(_corners(self.points_mm[of]))
+        return found
+
+
+def _corners(points_mm: Floats) -> Floats:
+    if len(points_mm) < 8:
+        return points_mm
+    try:
+        return np.asarray(points_mm[ConvexHull(points_mm).vertices])
+    except QhullError:
+        return points_mm

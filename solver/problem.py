@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
 
 from geometry.arrays import Bools, Floats
 from geometry.camera import Camera, RigCamera
@@ -141,13 +140,7 @@ class Problem:
         Projections keep convex sets convex, so constraints on these corners hold for all.
         Flat or tiny sets are returned whole.
         """
-        points = self.subject.check_points.points_mm[framed]
-        if len(points) < 8:
-            return points
-        try:
-            return np.asarray(points[ConvexHull(points).vertices])
-        except QhullError:
-            return points
+        return self.subject.check_points.corners_mm(framed)
 
 
 def camera_at(camera: Camera, name: str, pose: Pose, targets_mm: Floats) -> RigCamera:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +13,13 @@ from geometry.camera import RigCamera
 from geometry.frames import Pose
 from geometry.optics import blur_disk_mm, depth_of_field_mm, ground_sample_distance_mm
 from geometry.subject import Subject
-from solver.constraints.table import constraint_table, row
+from solver.constraints.table import (
+    camera_rows,
+    constraint_table,
+    coverage_rows,
+    place_rows,
+    row,
+)
 from solver.coverage.matchable import Matchable, MatchableViews
 from solver.coverage.views import in_frame
 from solver.coverage.visibility import cast_rays
@@ -59,6 +66,17 @@ class Observations:
             framed[i] &= in_frame(camera, points)
             sharp[i] = framed[i] & is_sharp(camera, depth[i])
         return cls(found.seen, framed, sharp, found.cosine, depth)
+
+    @classmethod
+    def stacked(cls, parts: Sequence[Observations]) -> Observations:
+        """What the cameras of all parts see, in their order."""
+        return cls(
+            np.concatenate([p.visible for p in parts]),
+            np.concatenate([p.framed for p in parts]),
+            np.concatenate([p.sharp for p in parts]),
+            np.concatenate([p.cosine for p in parts]),
+            np.concatenate([p.depth_mm for p in parts]),
+        )
 
 
 def is_sharp(camera: RigCamera, depth_mm: Floats) -> Bools:
@@ -112,17 +130,29 @@ def evaluate(
 def keeps_limits(subject: Subject, cameras: tuple[RigCamera, ...], limits: Limits) -> bool:
     """Whether a network is feasible, as :func:`evaluate` says, without the figures of its points.
 
-    For many trials of one rig: it takes seven eighths of the time.
+    For many trials of one rig: the cheapest limits come first, and the first one that is broken
+    ends it.
     """
     _must_be_named(cameras)
     problem = Problem(subject, cameras, limits)
-    found = [Observations.of(problem, position) for position in problem.visibility_positions]
-    table = constraint_table(problem, [f.visible for f in found], _coverage(problem, found))
-    if not all(row.satisfied for row in table):
-        return False
-    if not limits.matching.demanded:
-        return True
-    return all(row.satisfied for row in _matching_rows(_matchable(problem, found)))
+    return all(row.satisfied for row in _cheapest_first(problem))
+
+
+def _cheapest_first(problem: Problem) -> Iterator[ConstraintRow]:
+    """All limits but the bounds about an anchor, each with no more work than it needs."""
+    yield from place_rows(problem)
+    positions = problem.visibility_positions
+    each: list[list[Observations]] = []
+    for camera in problem.cameras:
+        # Its depths are in millimetres: that it stands alone in this problem changes no ray.
+        alone = Problem(problem.subject, (camera,), problem.limits)
+        each.append([Observations.of(alone, position) for position in positions])
+        seen = np.logical_or.reduce([sight.visible[0] for sight in each[-1]])
+        yield from camera_rows(problem, camera, seen)
+    found = [Observations.stacked(sights) for sights in zip(*each, strict=True)]
+    yield from coverage_rows(problem, _coverage(problem, found))
+    if problem.limits.matching.demanded:
+        yield from _matching_rows(_matchable(problem, found))
 
 
 def _must_be_named(cameras: tuple[RigCamera, ...]) -> None:

@@ -20,12 +20,12 @@ def origin_of(zones: Zones, subject: Subject) -> ZoneOrigin:
     The rig frame's origin where it lies in the scan or beside it, and where nothing but points
     is given; a scan that stands elsewhere has an origin that has nothing to do with the head.
     """
-    vertices = subject.occluder.vertices_mm
     if zones.about is not None:
         return zones.about
-    if not len(vertices):
+    if not len(subject.occluder.vertices_mm):
         return ZoneOrigin.RIG
-    low, high = vertices.min(axis=0) - _BESIDE_MM, vertices.max(axis=0) + _BESIDE_MM
+    low, high = subject.occluder.extent_mm
+    low, high = low - _BESIDE_MM, high + _BESIDE_MM
     return ZoneOrigin.RIG if bool(((low <= 0.0) & (high >= 0.0)).all()) else ZoneOrigin.HEAD
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -13,6 +14,7 @@ from geometry.camera.distortion import (
     NO_DISTORTION,
     TERM_COUNTS,
     LensModel,
+    bends,
     distort,
     fold_radius,
     model_of,
@@ -181,7 +183,7 @@ class Camera:
         ends = np.array([[-0.5, cy], [w - 0.5, cy], [cx, -0.5], [cx, h - 0.5]])
         seen = self.normalised(ends)
         tangent = np.array([-seen[0, 0], seen[1, 0], -seen[2, 1], seen[3, 1]])
-        tangent = np.where(np.isfinite(tangent), tangent, fold_radius(self.distortion))
+        tangent = np.where(np.isfinite(tangent), tangent, self._fold)
         left, right, top, bottom = np.degrees(np.arctan(tangent)).tolist()
         return left + right, top + bottom
 
@@ -193,6 +195,13 @@ class Camera:
         point inside it is inside the real image too. The image reaches half a pixel beyond the
         centres of its outermost pixels.
         """
+        # Kept, as the fold is: one kind of camera is asked again at every place that is tried.
+        known = self._frames.get(margin_px)
+        if known is None:
+            known = self._frames[margin_px] = frozen(self._frame_less(margin_px))
+        return known
+
+    def _frame_less(self, margin_px: float) -> Floats:
         w, h = self.image_size_px
         xs = np.linspace(-0.5 + margin_px, w - 0.5 - margin_px, 65)
         ys = np.linspace(-0.5 + margin_px, h - 0.5 - margin_px, 65)
@@ -213,6 +222,14 @@ class Camera:
         )
         return np.array([left[:, 0].max(), right[:, 0].min(), top[:, 1].max(), bottom[:, 1].min()])
 
+    @cached_property
+    def _frames(self) -> dict[float, Floats]:
+        return {}
+
+    @cached_property
+    def _fold(self) -> float:
+        return fold_radius(self.distortion)
+
     def normalised(self, pixels: Floats) -> Floats:
         """Undistorted x/z, y/z (..., 2) of pixels (..., 2); NaN where nothing is imaged to them."""
         distorted = (np.asarray(pixels) - self.principal_point_px) / self.focal_length_px
@@ -220,10 +237,12 @@ class Camera:
 
     def pixels(self, normalised: Floats) -> Floats:
         """Pixels (..., 2) of x/z, y/z (..., 2); NaN beyond the fold of the distortion."""
+        if not bends(self.distortion):
+            return np.asarray(normalised * self.focal_length_px + self.principal_point_px)
         pixels = (
             distort(normalised, self.distortion) * self.focal_length_px + self.principal_point_px
         )
-        beyond = np.hypot(normalised[..., 0], normalised[..., 1]) > fold_radius(self.distortion)
+        beyond = np.hypot(normalised[..., 0], normalised[..., 1]) > self._fold
         return np.where(beyond[..., None], np.nan, pixels)
 
     def project(self, pose: Pose, points_rig_mm: Floats) -> tuple[Floats, Floats]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields
+from functools import cached_property
 from types import MappingProxyType
 from typing import TypeVar
 
@@ -96,9 +97,16 @@ class Catalogue:
 
     def find(self, wanted: str) -> tuple[str, Part]:
         """Any part by id or name, with its table; raises :class:`NotFoundError`."""
-        all_parts = {part.id: part for _, part in self.parts()}
-        found = pick(wanted, all_parts, "part")
-        return next((table, part) for table, part in self.parts() if part is found)
+        found = pick(wanted, self._by_id, "part")
+        return self._table_of[found.id], found
+
+    @cached_property
+    def _by_id(self) -> dict[str, Part]:
+        return {part.id: part for _, part in self.parts()}
+
+    @cached_property
+    def _table_of(self) -> dict[str, str]:
+        return {part.id: table for table, part in self.parts()}
 
     def parts_of(self, camera_name: str) -> tuple[CatalogueCamera, CatalogueLens] | None:
         """Body and lens of a kind of camera whose name is ``MODEL LENS``; None for others.

@@ -54,5 +54,8 @@ class CandidateConstraints:
 
 def grouped(*keys: Ints | Floats) -> Ints:
     """One integer per distinct combination of the keys, (rows,)."""
-    table = np.stack([np.asarray(k) for k in keys], axis=1)
-    return np.asarray(np.unique(table, axis=0, return_inverse=True)[1].ravel(), dtype=np.int64)
+    code = np.zeros(len(keys[0]), dtype=np.int64)
+    for key in keys:
+        found, place = np.unique(np.asarray(key), return_inverse=True)
+        code = code * len(found) + place
+    return np.asarray(np.unique(code, return_inverse=True)[1], dtype=np.int64)

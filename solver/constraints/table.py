@@ -63,22 +63,30 @@ def constraint_table(
 
     ``visible`` (n, q) per head position of the scene's visibility positions.
     """
-    state = problem.unknowns.state(problem.start_values())
-    rows: list[ConstraintRow] = []
     seen = np.logical_or.reduce(visible)
+    rows: list[ConstraintRow] = []
     for i, camera in enumerate(problem.cameras):
-        rows += _of_camera(problem, camera, seen[i])
-    rows += _rolls(problem)
-    rows += _means(problem)
-    for candidates in position_constraints(problem, state) + body_constraints(problem, state):
-        rows += _of_block(problem, state, candidates)
-    rows += _of_coverage(problem, coverage)
+        rows += camera_rows(problem, camera, seen[i])
+    rows += place_rows(problem)
+    rows += coverage_rows(problem, coverage)
     rows += _of_bounds(problem)
     return tuple(rows)
 
 
-def _of_camera(problem: Problem, camera: RigCamera, seen: Bools) -> Iterator[ConstraintRow]:
-    """Frame, focus and sampling distance of one camera, in all head positions."""
+def place_rows(problem: Problem) -> Iterator[ConstraintRow]:
+    """The limits for which no ray need be cast, but for the bounds about an anchor."""
+    state = problem.unknowns.state(problem.start_values())
+    yield from _rolls(problem)
+    yield from _means(problem)
+    for candidates in position_constraints(problem, state) + body_constraints(problem, state):
+        yield from _of_block(problem, state, candidates)
+
+
+def camera_rows(problem: Problem, camera: RigCamera, seen: Bools) -> Iterator[ConstraintRow]:
+    """Frame, focus and sampling distance of one camera, in all head positions.
+
+    ``seen`` (q,): the check points that it sees in one of them or more.
+    """
     limits, kind = problem.limits, camera.camera
     if limits.depth_of_field:
         nearest = kind.min_focus_distance_mm
@@ -98,7 +106,8 @@ def _of_camera(problem: Problem, camera: RigCamera, seen: Bools) -> Iterator[Con
     if limits.frame is not None:
         w, h = kind.image_size_px
         border = np.minimum(pixels + 0.5, np.array([w, h]) - 0.5 - pixels)
-        value = float(np.where(depth > 0.0, border.min(axis=1), -np.inf).min())
+        nearest_px = np.minimum(border[:, 0], border[:, 1])
+        value = float(np.where(depth > 0.0, nearest_px, -np.inf).min())
         yield row(
             f"frame/{camera.name}", value, limits.frame.margin_px, Sense.AT_LEAST, "px", float(w)
         )
@@ -182,7 +191,7 @@ def _of_block(
     """Rows of places and bodies, the worst of each camera or pair."""
     block = candidates.block
     value = block.value(state)
-    slack = np.minimum(value - block.lower, block.upper - value)
+    slack = np.minimum(value - block.lower, block.upper - value).tolist()
     if isinstance(block, WeightedSum):
         subjects: tuple[tuple[int, ...], ...] = ((-1,),) * block.rows
     else:
@@ -236,7 +245,8 @@ def _clearance(problem: Problem, family: str) -> float:
     return asked.get(family) or 0.0
 
 
-def _of_coverage(problem: Problem, coverage: tuple[CoverageShare, ...]) -> Iterator[ConstraintRow]:
+def coverage_rows(problem: Problem, coverage: tuple[CoverageShare, ...]) -> Iterator[ConstraintRow]:
+    """The limits on how many cameras see each point."""
     reached = {c.views: c.share for c in coverage}
     for tier in problem.limits.coverage.tiers:
         share = reached.get(min(tier.views, problem.count), 0.0)

@@ -9,12 +9,13 @@ import pytest
 import rigs
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 from geometry.camera import Body
 from geometry.frames import Pose
 from geometry.optics import blur_disk_mm
-from geometry.surface import SurfacePoints
+from geometry.surface import HULLS_KEPT, SurfacePoints
 from solver.limits import Frame, MotionBox, PoseBounds, StandOff
 from solver.motion import HeadPosition, framing_positions, rest, visibility_positions
 from solver.problem import Problem, camera_at
@@ -314,6 +315,25 @@ def test_the_hull_stands_for_all_points() -> None:
     for direction in np.random.default_rng(0).normal(size=(20, 3)):
         assert (hull @ direction).max() == (inside @ direction).max()
     assert len(problem.hull(np.arange(300) < 5)) == 5
+
+
+def test_a_hull_is_found_once_for_each_set_of_points(monkeypatch: pytest.MonkeyPatch) -> None:
+    found: list[int] = []
+
+    def counted(points: np.ndarray) -> ConvexHull:
+        found.append(len(points))
+        return ConvexHull(points)
+
+    monkeypatch.setattr("geometry.surface.ConvexHull", counted)
+    rng = np.random.default_rng(2)
+    inside = rng.normal(size=(60, 3))
+    points = SurfacePoints(inside, inside)
+    masks = rng.random((HULLS_KEPT + 20, 60)) < 0.7
+    for mask in masks:
+        first = points.corners_mm(mask)
+        assert points.corners_mm(mask.copy()) is first
+        assert np.array_equal(first, inside[mask][ConvexHull(inside[mask]).vertices])
+    assert found == masks.sum(axis=1).tolist()
 
 
 def test_the_problem_scales_lengths_about_its_origin() -> None:

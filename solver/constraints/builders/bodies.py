@@ -148,21 +148,21 @@ def _sight_lines(problem: Problem, state: NetworkState) -> list[CandidateConstra
     if clearance is None or problem.count < 2:
         return []
     camera, offset, radius = _sphere_table(problem)
+    first = np.flatnonzero(np.diff(camera, prepend=-1))
+    fixed = np.array([c.fixed for c in problem.cameras])
+    place = carried(state, camera, offset)
     parts = []
     for i, looking in enumerate(problem.cameras):
         sides = np.concatenate([frame_normals(looking.camera.frame_limits()), [[0.0, 0.0, -1.0]]])
         sides /= np.linalg.norm(sides, axis=1, keepdims=True)
-        local = (carried(state, camera, offset) - state.centre[i]) @ state.rotation[i].T
+        local = (place - state.centre[i]) @ state.rotation[i].T
         clear = local @ sides.T - radius[:, None]
-        for k, other in enumerate(problem.cameras):
-            if k == i or (looking.fixed and other.fixed):
-                continue
-            rows = np.flatnonzero(camera == k)
-            side = int(np.argmax(clear[rows].min(axis=0)))
-            parts.append((np.full(len(rows), i), rows, np.tile(sides[side], (len(rows), 1))))
-    if not parts:
-        return []
+        side = np.argmax(np.minimum.reduceat(clear, first, axis=0), axis=1)
+        rows = np.flatnonzero((camera != i) & ~(fixed[i] & fixed[camera]))
+        parts.append((np.full(len(rows), i), rows, sides[side[camera[rows]]]))
     looks, rows = np.concatenate([p[0] for p in parts]), np.concatenate([p[1] for p in parts])
+    if not len(rows):
+        return []
     low = radius[rows] + clearance / problem.length_mm
     block = ViewPlanes(
         "sight_line",
