@@ -13,6 +13,7 @@ from calibration.adjustment.covariance import Covariance
 from calibration.adjustment.crossvalidation import cross_validate
 from calibration.adjustment.finite import finite_rows
 from calibration.adjustment.initialisation.finding import find_start
+from calibration.adjustment.initialisation.views import ANY_FRAME
 from calibration.adjustment.inspection import inspect
 from calibration.adjustment.lensfit import judged_lenses, told_of_lens
 from calibration.adjustment.levenberg import Solution, Stop, adjust
@@ -128,6 +129,7 @@ def _adjusted(
     network, state = start.network, start.state
     stated, rejected = network.sigma_px, np.empty(0, np.int64)
     noise, own = NoiseModel.stated(network.camera_count), False
+    moving = start.placements.frame != ANY_FRAME
     solution = adjust_in_stages(
         network, state, options.loss, bool(options.start), within(progress, 0.1, 0.9), cancel
     )
@@ -136,11 +138,11 @@ def _adjusted(
     for round_ in range(ROUNDS + 1):
         covariance = solution.reduction.covariance()
         found = reliability(solution, covariance, network)
-        bad, change = settle(solution, network, found, options, not own)
+        bad, change = settle(solution, network, found, options, not own, moving)
         stable = not (bad.any() or np.abs(change - 1.0).max() > SETTLED)
         if stable or round_ == ROUNDS or solution.stop is Stop.STUCK:
             break
-        late += _views(observations, start, network, late_points(solution, network) & bad)
+        late += _views(observations, start, network, late_points(solution, network, moving) & bad)
         rejected = np.concatenate([rejected, start.rows[bad]])
         own = own or bool(np.ptp(change) > 0.0)
         noise = noise.changed(change, stated, network.observed.camera)
@@ -162,10 +164,7 @@ def _views(
     pairs = np.unique(np.stack([observed.camera[late], observed.pose[late]], axis=1), axis=0)
     frames = start.placements.frame
     return [
-        LateView(
-            observations.cameras[int(c)],
-            observations.frames[int(frames[p])] if frames[p] >= 0 else "",
-        )
+        LateView(observations.cameras[int(c)], observations.frames[int(frames[p])])
         for c, p in pairs
     ]
 

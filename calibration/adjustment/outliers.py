@@ -45,8 +45,11 @@ def settle(
     found: Reliability,
     options: CalibrationOptions,
     equal: bool,
+    moving: Bools,
 ) -> tuple[Bools, Floats]:
     """Blunders (n,), and factors (cameras,) by which stated sigmas are to be changed.
+
+    ``moving`` (places,): see :func:`late_points`.
 
     Cameras get sigmas of their own once, when nothing bad is left and they have none yet
     (``equal``). Repeated, the best would be believed more and more: it would take the moving
@@ -55,7 +58,7 @@ def settle(
     count = network.camera_count
     bad = np.zeros(len(found.t), bool)
     if options.reject:
-        bad = late_points(solution, network)
+        bad = late_points(solution, network, moving)
         # Views go first: their points would each look like a blunder of its own.
         bad = bad if bad.any() else _blunders(network, found, options.rescale)
     if not options.rescale:
@@ -95,10 +98,11 @@ def _kept(found: Reliability, good: Bools) -> Reliability:
     return Reliability(found.redundancy * good[:, None], found.w, found.t)
 
 
-def late_points(solution: Solution, network: Network) -> Bools:
+def late_points(solution: Solution, network: Network, moving: Bools) -> Bools:
     """Points (n,) of views that were taken at another moment than the other cameras' views.
 
-    Of each place the worst view only: the others may have suffered from it.
+    Of each place the worst view only: the others may have suffered from it. Only places of what
+    is ``moving`` (places,) count: what stands still is where it is at every moment.
     """
     observed, misfit = network.observed, misfits(solution.residuals, network)
     keys = observed.camera * network.pose_count + observed.pose
@@ -117,7 +121,7 @@ def late_points(solution: Solution, network: Network) -> Bools:
             late[own] = middle[own] > LATE * max(float(np.median(middle[own])), _USUAL)
     worst = np.zeros(network.pose_count)
     np.maximum.at(worst, place, middle)
-    late &= (counts >= LEAST_IN_VIEW) & (middle >= worst[place])
+    late &= (counts >= LEAST_IN_VIEW) & (middle >= worst[place]) & moving[place]
     return np.asarray(late[view])
 
 

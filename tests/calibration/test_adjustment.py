@@ -183,6 +183,21 @@ def test_a_view_taken_at_another_moment_is_left_out_whole_and_named() -> None:
     assert "check the synchronisation" in found.quality.warnings[0]
 
 
+def test_what_stands_still_is_never_taken_for_another_moment() -> None:
+    observations = SCENE.observe(0.1, 12)
+    own = (observations.targets.carrier_of[observations.target] == 0) & (observations.camera == 3)
+    pixel = observations.pixel.copy()
+    # Three sigmas and more off, one way or the other: as much as a late view's, point by point.
+    pixel[own] += np.where(np.arange(own.sum())[:, None] % 2, 0.4, -0.4)
+    spoilt = replace(observations, pixel=pixel)
+    found = calibrate(spoilt, CalibrationOptions(start=SCENE.cameras, cross_validate=False))
+    assert found.quality.late_views == ()
+    assert not any("another moment" in words for words in found.quality.warnings)
+    # The points are worse than stated, and that is what the camera's sigma says.
+    sigma = sigmas_in_use(found, 0.1)
+    assert sigma[3] > 1.5 * np.median(sigma)
+
+
 def test_smallest_blunders_follow_baarda(solved: tuple[Network, Solution]) -> None:
     network, solution = solved
     found = reliability(solution, solution.reduction.covariance(), network)
