@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
-from evaluation.reconstruction.depthmaps import STEEPEST_DEG, DepthMap, Matching, bend, matched
+from evaluation.reconstruction.depthmaps import DepthMap, Matching, bend, matched
 from evaluation.reconstruction.fusion import MeasuredPoints, points_of
 from evaluation.reconstruction.views import View
 from geometry.arrays import Bools, Floats
@@ -86,10 +86,12 @@ def filled(
     planes: Floats,
     matching: Matching,
     scale_px_mm: float,
+    steepest_deg: float,
 ) -> MeasuredPoints:
     """Patches at ``pixels`` (N, 2) from ``planes`` (N, 3) that matched and stayed near them.
 
-    ``scale_px_mm`` as in :func:`.depthmaps.steady`.
+    ``scale_px_mm`` as in :func:`.depthmaps.steady`; see :func:`.depthmaps.facing` for
+    ``steepest_deg``.
     """
     found = matched(map_.reference, others, pixels, planes[:, 0], planes[:, 1:], matching)
     # Curvature as the map's own patches tell it: these lie too far apart.
@@ -100,4 +102,4 @@ def filled(
     made = points_of(map_, pixels[good], rho[good], found[good, 1:3], found[good, 3], views[good])
     rays = made.points_mm - map_.reference.pose.position_rig_mm
     cosine = -np.einsum("ij,ij->i", made.normals, rays) / np.linalg.norm(rays, axis=1)
-    return made.subset(cosine >= np.cos(np.radians(STEEPEST_DEG)))
+    return made.subset(cosine >= np.cos(np.radians(steepest_deg)))

@@ -16,6 +16,7 @@ from evaluation.reconstruction.volume import Volume
 from geometry.arrays import Bools, Floats
 
 STEEPEST_DEG = 70.0
+"""More slanted patches reach over three times as much of the surface as others: it is no plane."""
 
 
 @dataclass(frozen=True)
@@ -210,18 +211,15 @@ def bent(map_: DepthMap, half_width_px: int) -> DepthMap:
     return replace(map_, inverse_depth_per_mm=rho)
 
 
-def facing(map_: DepthMap) -> Bools:
-    """Which patches (h, w) their camera sees at less than 70 degrees from the normal.
-
-    More slanted ones reach over three times as much of the surface as others, which is no plane.
-    """
+def facing(map_: DepthMap, steepest_deg: float) -> Bools:
+    """Which patches (h, w) their camera sees at no more than that from the normal."""
     view = map_.reference
     rows, columns = np.indices(map_.inverse_depth_per_mm.shape) * float(map_.stride_px)
     rho, slope = map_.inverse_depth_per_mm, map_.slopes
     flat = rho - slope[..., 0] * columns - slope[..., 1] * rows
     plane = np.stack([slope[..., 0], slope[..., 1], flat], axis=-1) @ view.matrix
     rays = np.stack([columns, rows, np.ones_like(rows)], axis=-1) @ np.linalg.inv(view.matrix).T
-    least = np.cos(np.radians(STEEPEST_DEG))
+    least = np.cos(np.radians(steepest_deg))
     length = np.linalg.norm(plane, axis=-1) * np.linalg.norm(rays, axis=-1)
     with np.errstate(invalid="ignore"):
         return np.asarray(rho >= least * length)

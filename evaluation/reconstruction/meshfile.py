@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from evaluation.extras import plyfile
 from evaluation.reconstruction.surface import SurfaceMesh
+from evaluation.reconstruction.texture import Texture
+from geometry.arrays import Ints
 from rig.report.scene import GLTF_FROM_RIG
+
+if TYPE_CHECKING:
+    from trimesh.visual import TextureVisuals
 
 
 def mesh_ply(mesh: SurfaceMesh) -> bytes:
@@ -30,17 +35,22 @@ def mesh_ply(mesh: SurfaceMesh) -> bytes:
     return stream.getvalue()
 
 
-def mesh_glb(mesh: SurfaceMesh) -> bytes:
-    """GLB in metres with +Y up, as glTF wants it: vertex colours, and sigma as ``_SIGMA_MM``."""
+def mesh_glb(mesh: SurfaceMesh, texture: Texture | None = None) -> bytes:
+    """GLB in metres with +Y up, as glTF wants it: the texture or vertex colours, and ``_SIGMA_MM``.
+
+    That attribute is the sigma of each vertex.
+    """
     # Imported here: trimesh takes a third of a second.
     import trimesh
 
+    vertex, faces = _split(mesh, texture)
     solid = trimesh.Trimesh(
-        mesh.vertices_mm @ GLTF_FROM_RIG.T,
-        mesh.faces,
-        vertex_normals=mesh.normals @ GLTF_FROM_RIG.T * 1000.0,
-        vertex_colors=mesh.colours,
-        vertex_attributes={"_SIGMA_MM": mesh.sigma_mm.astype(np.float32)},
+        mesh.vertices_mm[vertex] @ GLTF_FROM_RIG.T,
+        faces,
+        vertex_normals=mesh.normals[vertex] @ GLTF_FROM_RIG.T * 1000.0,
+        vertex_colors=None if texture else mesh.colours,
+        vertex_attributes={"_SIGMA_MM": mesh.sigma_mm[vertex].astype(np.float32)},
+        visual=_visual(texture),
         process=False,
     )
     scene = trimesh.Scene()
@@ -48,31 +58,60 @@ def mesh_glb(mesh: SurfaceMesh) -> bytes:
     return bytes(scene.export(file_type="glb"))  # type: ignore[no-untyped-call]
 
 
-def mesh_obj(mesh: SurfaceMesh) -> bytes:
-    """OBJ in the rig frame, mm: normals, and colours behind the places as most programs read them.
+def mesh_obj(mesh: SurfaceMesh, texture: Texture | None = None) -> dict[str, bytes]:
+    """OBJ in the rig frame, mm, with normals: ``mesh.obj``, and material and picture of a texture.
 
-    Its text has no place for sigma.
+    Without one the colours stand behind the places, as most programs read them. Its text has no
+    place for sigma.
     """
     # Imported here: trimesh takes a third of a second.
     from trimesh import Trimesh
     from trimesh.exchange.obj import export_obj
 
+    vertex, faces = _split(mesh, texture)
     solid = Trimesh(
-        mesh.vertices_mm,
-        mesh.faces,
-        vertex_normals=mesh.normals,
-        vertex_colors=mesh.colours,
+        mesh.vertices_mm[vertex],
+        faces,
+        vertex_normals=mesh.normals[vertex],
+        vertex_colors=None if texture else mesh.colours,
+        visual=_visual(texture),
         process=False,
     )
-    text = export_obj(  # type: ignore[no-untyped-call]
-        solid, include_normals=True, include_color=True, digits=6
+    text, files = export_obj(  # type: ignore[no-untyped-call]
+        solid,
+        include_normals=True,
+        include_color=True,
+        return_texture=True,
+        digits=6,
+        mtl_name="mesh.mtl",
     )
-    return str(text).encode()
+    beside = files if texture else {}
+    return {"mesh.obj": str(text).encode()} | {name: bytes(data) for name, data in beside.items()}
 
 
-MESHES: Mapping[str, Callable[[SurfaceMesh], bytes]] = {
-    "ply": mesh_ply,
-    "glb": mesh_glb,
-    "obj": mesh_obj,
-}
-"""How a mesh is written, by the ending of its file."""
+def _split(mesh: SurfaceMesh, texture: Texture | None) -> tuple[Ints, Ints]:
+    """Which vertices are written, and the faces by these."""
+    if texture is None:
+        return np.arange(len(mesh.vertices_mm)), mesh.faces
+    return texture.vertex, texture.faces
+
+
+def _visual(texture: Texture | None) -> TextureVisuals | None:
+    if texture is None:
+        return None
+    from PIL import Image
+    from trimesh.visual import TextureVisuals
+    from trimesh.visual.material import PBRMaterial
+
+    image = Image.fromarray(texture.image)
+    material = PBRMaterial(  # type: ignore[no-untyped-call]
+        "mesh", baseColorTexture=image, metallicFactor=0.0, roughnessFactor=1.0
+    )
+    return TextureVisuals(uv=texture.uv, material=material)  # type: ignore[no-untyped-call]
+
+
+def mesh_files(mesh: SurfaceMesh, ending: str, texture: Texture | None = None) -> dict[str, bytes]:
+    """The files of a mesh by name, ``ending`` ply, glb or obj. PLY has vertex colours always."""
+    if ending == "obj":
+        return mesh_obj(mesh, texture)
+    return {f"mesh.{ending}": mesh_ply(mesh) if ending == "ply" else mesh_glb(mesh, texture)}

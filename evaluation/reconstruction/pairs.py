@@ -25,6 +25,14 @@ def ray_angles_deg(views: Sequence[View], volume: Volume) -> Floats:
     return np.asarray(np.degrees(np.arccos(np.clip(rays @ rays.T, -1.0, 1.0))))
 
 
+def pixel_ratios(views: Sequence[View], volume: Volume) -> Floats:
+    """Larger over smaller pixel of each two cameras in the middle of the subject, (n, n)."""
+    away = [np.linalg.norm(v.pose.position_rig_mm - volume.centre_rig_mm) for v in views]
+    sizes = np.array([d / v.matrix[0, 0] for d, v in zip(away, views, strict=True)])
+    ratio = sizes[:, None] / sizes
+    return np.asarray(np.maximum(ratio, 1.0 / ratio))
+
+
 def _within(row_deg: Floats, reference: int, farthest_deg: float) -> list[int]:
     return [k for k, a in enumerate(row_deg) if k != reference and NEAREST_DEG <= a <= farthest_deg]
 

@@ -44,7 +44,7 @@ from evaluation.reconstruction.depthmaps import (
 )
 from evaluation.reconstruction.fusion import FusedPoints, best_references, boldness, fused, joined
 from evaluation.reconstruction.neighbours import on_surface
-from evaluation.reconstruction.pairs import companions, partners, ray_angles_deg
+from evaluation.reconstruction.pairs import companions, partners, pixel_ratios, ray_angles_deg
 from evaluation.reconstruction.views import View, memory_told
 from evaluation.reconstruction.volume import Volume, common_volume
 from geometry.arrays import Bools, Floats
@@ -77,7 +77,9 @@ class ReconstructionOptions:
     beside the reference in a patch. ``stray_mm``: points farther off their neighbours go. A
     place that is farther from all points than ``gap_ratio`` times their usual spacing gets one
     more. Cameras whose rays to the subject meet at more than ``farthest_deg`` are not matched: skin
-    looks too different for one patch model. ``keep_maps`` keeps the depth maps of all cameras.
+    looks too different for one patch model; nor are those of which one has pixels more than
+    ``largest_ratio`` times as large on the subject. What a camera sees at more than
+    ``steepest_deg`` from its normal it does not measure. ``keep_maps`` keeps all depth maps.
     """
 
     references: int = 3
@@ -88,6 +90,8 @@ class ReconstructionOptions:
     stray_mm: float = 0.05
     gap_ratio: float = 0.85
     farthest_deg: float = CanMatch().max_angle_deg
+    steepest_deg: float = CanMatch().max_incidence_deg
+    largest_ratio: float = np.inf
     half: Matching = field(default_factory=lambda: Matching(half_width_samples=4, steps=6))
     full: Matching = field(default_factory=lambda: Matching(half_width_samples=4, steps=5))
     workers: int = 2
@@ -215,7 +219,8 @@ def _more(
             continue
         others = [network.full[n] for n in network.companions[k]]
         scale = network.scale_px_mm(k, network.full)
-        more = filled(maps[k], others, places[k].pixels[take], planes[k][take], how, scale)
+        at, plane = places[k].pixels[take], planes[k][take]
+        more = filled(maps[k], others, at, plane, how, scale, options.steepest_deg)
         made = _inside(fused(maps, k, more), network.volume)
         sure = made.sigma_mm <= SURE_TIMES * float(np.median(points.sigma_mm))
         found.append((k, made.subset(sure & (np.abs(made.apart) <= SURE_SIGMAS))))
@@ -249,17 +254,20 @@ class _Reporter:
 
 
 def _network(views: Sequence[View], volume: Volume, options: ReconstructionOptions) -> _Network:
-    angles = ray_angles_deg(views, volume)
+    alike = pixel_ratios(views, volume) <= options.largest_ratio
+    angles = np.where(alike, ray_angles_deg(views, volume), np.inf)
     count = len(views)
     pairs = tuple(partners(angles, k, options.partners, options.farthest_deg) for k in range(count))
     near = tuple(
         companions(angles, k, options.companions, options.farthest_deg) for k in range(count)
     )
     if not any(pairs):
+        ratio = options.largest_ratio
+        like = f", with pixels at most {ratio:g} times as large" if np.isfinite(ratio) else ""
         raise InputError(
             "cameras-apart",
             "no two cameras see the subject from directions less than "
-            f"{options.farthest_deg:g} degrees apart",
+            f"{options.farthest_deg:g} degrees apart{like}",
             "give more cameras, or cameras that stand nearer to one another",
         )
     half = tuple(v.reduced() for v in views)
@@ -327,7 +335,8 @@ def _full_map(
         return refined_none(view, shape, stride), 0
     start, slopes = upsampled(half, best, shape, stride)
     found = refined(view, others, start, slopes, stride, options.full)
-    keep = steady(found, 2.0, network.scale_px_mm(k, network.full)) & facing(found)
+    keep = steady(found, 2.0, network.scale_px_mm(k, network.full))
+    keep &= facing(found, options.steepest_deg)
     found = bent(masked(found, keep), options.full.half_width_samples)
     return found, int(np.isfinite(start).sum())
 

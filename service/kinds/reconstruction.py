@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from service.kinds.base import JobKind, Request, Result
 
@@ -37,6 +37,16 @@ class ReconstructionRequest(Request):
         bool,
         Field(description="Whether to write what each camera measured, as depthmaps/CAMERA.tif."),
     ] = False
+    texture: Annotated[
+        bool,
+        Field(description="Whether mesh.glb and mesh.obj get a picture, cut from the pictures."),
+    ] = False
+
+    @model_validator(mode="after")
+    def _has_a_mesh_for_its_texture(self) -> ReconstructionRequest:
+        if self.texture and not {"glb", "obj"} & set(self.meshes):
+            raise ValueError("a texture needs a mesh that can have one: give glb or obj to meshes")
+        return self
 
 
 class CameraPart(Result):
@@ -56,6 +66,17 @@ class DoubtPart(Result):
     words: str
 
 
+class TexturePart(Result):
+    """The picture on the mesh."""
+
+    width_px: int
+    height_px: int
+    unseen_faces: Annotated[
+        int,
+        Field(description="Triangles that no camera sees whole; their points' colours are theirs."),
+    ]
+
+
 class ReconstructionResult(Result):
     """What was found, in short; ``cloud.ply`` holds the points, ``mesh.ply`` the surface."""
 
@@ -71,6 +92,9 @@ class ReconstructionResult(Result):
     without_pictures: Annotated[
         list[str], Field(description="Cameras of the rig that have no picture of this instant.")
     ]
+    texture: Annotated[
+        TexturePart | None, Field(description="The picture on the mesh, where it was asked for.")
+    ] = None
     doubts: Annotated[
         tuple[DoubtPart, ...], Field(description="Cameras that the others speak against.")
     ] = ()

@@ -17,13 +17,14 @@ from common.progress import Progress, within
 from evaluation.extras import require_numba
 from evaluation.reconstruction.cloudfile import write_cloud
 from evaluation.reconstruction.depthfile import write_depth_maps
-from evaluation.reconstruction.meshfile import MESHES
+from evaluation.reconstruction.meshfile import mesh_files
 from evaluation.reconstruction.reconstructing import (
     Reconstruction,
     ReconstructionOptions,
     reconstruct,
 )
 from evaluation.reconstruction.surface import SurfaceMesh, meshed
+from evaluation.reconstruction.texture import Texture, textured
 from evaluation.reconstruction.views import View, view_of
 from evaluation.report.pages import reconstruction_page
 from geometry.camera import RigCamera
@@ -34,6 +35,7 @@ from service.kinds.reconstruction import (
     DoubtPart,
     ReconstructionRequest,
     ReconstructionResult,
+    TexturePart,
 )
 from service.pictures.listing import Picture
 from service.tasks.seeing import taken_pictures
@@ -70,8 +72,10 @@ def reconstruction(
     running.report(Progress("meshing", MATCHING))
     mesh = meshed(done.cloud, task.request.cell_mm, options.workers)
     write_cloud(task.folder / "cloud.ply", done.cloud)
+    texture = textured(mesh, views) if task.request.texture else None
     for ending in task.request.meshes:
-        (task.folder / f"mesh.{ending}").write_bytes(MESHES[ending](mesh))
+        for name, content in mesh_files(mesh, ending, texture).items():
+            (task.folder / name).write_bytes(content)
     if task.request.depth_maps:
         write_depth_maps(task.folder / "depthmaps", done.maps)
     running.report(Progress("drawing", 0.97))
@@ -81,7 +85,7 @@ def reconstruction(
     page = reconstruction_page(done, _shown(mesh, done, options.workers), title, notes)
     (task.folder / "report.html").write_text(page, encoding="utf-8")
     running.report(Progress("done", 1.0))
-    return _result(done, mesh, frame, missing)
+    return _result(done, mesh, texture, frame, missing)
 
 
 def _shown(mesh: SurfaceMesh, done: Reconstruction, workers: int) -> SurfaceMesh:
@@ -95,11 +99,17 @@ def _shown(mesh: SurfaceMesh, done: Reconstruction, workers: int) -> SurfaceMesh
 def matching_options(
     design: ReadDesign | None, stride_px: int, workers: int
 ) -> ReconstructionOptions:
-    """How to match: pairs within the angle that the design's rig file counts on."""
+    """How to match: what the design's rig file counts on."""
     options = ReconstructionOptions(stride_px=stride_px, workers=max(workers, 1))
     if design is None or design.file.rig is None:
         return options
-    return replace(options, farthest_deg=design.file.rig.matching.max_angle_deg)
+    told = design.file.rig.matching
+    return replace(
+        options,
+        farthest_deg=told.max_angle_deg,
+        steepest_deg=told.max_incidence_deg,
+        largest_ratio=told.max_scale_ratio,
+    )
 
 
 def _cameras(inputs: Mapping[str, Path], design: ReadDesign | None) -> tuple[RigCamera, ...]:
@@ -145,7 +155,11 @@ def _views(
 
 
 def _result(
-    done: Reconstruction, mesh: SurfaceMesh, frame: str, missing: list[str]
+    done: Reconstruction,
+    mesh: SurfaceMesh,
+    texture: Texture | None,
+    frame: str,
+    missing: list[str],
 ) -> ReconstructionResult:
     return ReconstructionResult(
         frame=frame,
@@ -161,5 +175,11 @@ def _result(
         mesh_faces=len(mesh.faces),
         mesh_area_mm2=round(mesh.area_mm2(), 1),
         without_pictures=missing,
+        texture=None if texture is None else _texture(texture),
         doubts=tuple(DoubtPart(camera=d.camera, kind=d.kind, words=d.words) for d in done.doubts),
     )
+
+
+def _texture(texture: Texture) -> TexturePart:
+    height, width = texture.image.shape[:2]
+    return TexturePart(width_px=width, height_px=height, unseen_faces=texture.unseen)

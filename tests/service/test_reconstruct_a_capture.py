@@ -22,16 +22,19 @@ def taken(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_the_head_is_found_where_it_was_photographed(taken: Path, tmp_path: Path) -> None:
     made = run(
         "reconstruct", taken / "pictures", "--design", taken / "design.json",
-        "--mesh", "ply", "--mesh", "obj", "--depth-maps", "--out", tmp_path / "face", "--json",
+        "--mesh", "ply", "--mesh", "obj", "--texture", "--depth-maps",
+        "--out", tmp_path / "face", "--json",
     )  # fmt: skip
     assert made.returncode == 0, made.stderr
     meshes = {path.name for path in (tmp_path / "face").glob("mesh.*")}
-    assert meshes == {"mesh.ply", "mesh.obj"}
+    assert meshes == {"mesh.ply", "mesh.obj", "mesh.mtl", "mesh.png"}
     maps = {path.stem for path in (tmp_path / "face" / "depthmaps").glob("*.tif")}
     assert maps == {folder.name for folder in (taken / "pictures").iterdir()}
     result = json.loads(made.stdout)["result"]
     assert result["without_pictures"] == []
     assert result["points"] > 10_000
+    # Points are seen by two cameras or more, so few triangles between them are seen by none.
+    assert result["texture"]["unseen_faces"] < 0.05 * result["mesh_faces"]
     page = (tmp_path / "face" / "report.html").read_text("utf-8")
     assert "from its left" in page
     assert 'id="surface-3d"' in page

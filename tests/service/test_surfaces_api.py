@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 import trimesh
 from evaluation_helpers import photographed, small_rig
+from pydantic import ValidationError
 from service_helpers import InThisProcess, TestClient, wait_for
 
 from common.progress import CancelToken, ProgressCallback
@@ -27,6 +28,7 @@ from service.api.context import Service
 from service.jobs.engine import Task
 from service.kinds.base import RequestT, ResultT
 from service.kinds.queued import QUEUED
+from service.kinds.reconstruction import ReconstructionRequest
 from service.settings import read_settings
 from service.store.jobrecords import NewJob
 from service.tasks.reconstructing import matching_options
@@ -180,9 +182,9 @@ def test_pictures_of_no_known_camera_are_told(
     assert client.get("/v1/reconstructions").json()["items"][0]["id"] == job["id"]
 
 
-def test_cameras_are_matched_up_to_the_angle_that_the_design_counts_on() -> None:
+def test_cameras_are_matched_as_the_design_counts_on() -> None:
     spec = example_rig("face")
-    spec = replace(spec, limits=replace(spec.limits, matching=Matching(max_angle_deg=25.0)))
+    spec = replace(spec, limits=replace(spec.limits, matching=Matching(25.0, 60.0, 1.2)))
     document: JSON = {
         "schema": "rigwright.design/1",
         "cameras": [placed_camera(camera) for camera in small_rig(spec.camera, np.zeros(3))],
@@ -191,8 +193,16 @@ def test_cameras_are_matched_up_to_the_angle_that_the_design_counts_on() -> None
     told = design_from_mapping(
         document | {"rig": RigFile.from_spec(spec).model_dump(by_alias=True, exclude_none=True)}
     )
-    assert matching_options(told, 3, 0) == replace(matching_options(None, 3, 1), farthest_deg=25.0)
+    assert matching_options(told, 3, 0) == replace(
+        matching_options(None, 3, 1), farthest_deg=25.0, steepest_deg=60.0, largest_ratio=1.2
+    )
     assert matching_options(plain, 3, 1) == matching_options(None, 3, 1)
+
+
+def test_a_texture_needs_a_mesh_that_can_have_one() -> None:
+    with pytest.raises(ValidationError, match="give glb or obj"):
+        ReconstructionRequest(meshes=("ply",), texture=True)
+    assert ReconstructionRequest(texture=True).meshes == ("ply", "glb")
 
 
 @pytest.mark.slow

@@ -72,6 +72,10 @@ def reconstruct(
         bool,
         typer.Option("--depth-maps", help="Write what each camera measured, as pictures of mm."),
     ] = False,
+    texture: Annotated[
+        bool,
+        typer.Option("--texture", help="Put the pictures onto mesh.glb and mesh.obj."),
+    ] = False,
     name: Annotated[str, typer.Option(help="What to call it.")] = "",
     workers: WorkersOption = None,
     as_json: JsonOption = False,
@@ -114,6 +118,7 @@ def reconstruct(
         asked = {
             "name": name, "frame": frame, "stride_px": stride, "cell_mm": cell,
             "meshes": mesh or (MeshEnding.PLY, MeshEnding.GLB), "depth_maps": depth_maps,
+            "texture": texture,
         }  # fmt: skip
         request = validated(ReconstructionRequest, asked, "the reconstruction")
         with new_folder(out, force=force, spare=[pictures, *inputs.values()]) as folder:

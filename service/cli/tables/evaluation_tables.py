@@ -24,6 +24,12 @@ def print_reconstruction(result: ReconstructionResult) -> None:
         f"in {result.mesh_faces:,} triangles; cameras without a picture: {missing}",
         markup=False,
     )
+    if result.texture is not None:
+        console.print(
+            f"texture of {result.texture.width_px} x {result.texture.height_px} px; triangles that "
+            f"no camera sees whole: {result.texture.unseen_faces:,}",
+            markup=False,
+        )
     for doubt in result.doubts:
         console.print(doubt.words, markup=False)
 

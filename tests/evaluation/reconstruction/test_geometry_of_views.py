@@ -11,10 +11,11 @@ import pytest
 
 from common.errors import InputError
 from evaluation.reconstruction.between import gaps, guesses
-from evaluation.reconstruction.depthmaps import DepthMap, bent, relations
+from evaluation.reconstruction.depthmaps import DepthMap, bent, facing, relations
 from evaluation.reconstruction.fusion import SHARED, boldness, fused, joined, measured_points
 from evaluation.reconstruction.neighbours import on_surface
-from evaluation.reconstruction.pairs import companions, partners, ray_angles_deg
+from evaluation.reconstruction.pairs import companions, partners, pixel_ratios, ray_angles_deg
+from evaluation.reconstruction.reconstructing import ReconstructionOptions, reconstruct
 from evaluation.reconstruction.views import View, memory_told
 from evaluation.reconstruction.volume import Volume, common_volume
 
@@ -74,6 +75,28 @@ def test_rays_to_the_middle_make_the_angles() -> None:
     angle = ray_angles_deg(views, Volume(np.zeros(3), 50.0))[0, 1]
     a, b = (v.pose.position_rig_mm for v in views[:2])
     assert np.cos(np.radians(angle)) == pytest.approx(a @ b / np.linalg.norm(a) / np.linalg.norm(b))
+
+
+def test_cameras_of_other_pixels_are_not_matched() -> None:
+    views = scenes.plane_views()
+    far = replace(views[0], name="far", pose=scenes.looking_at_origin((20.0, -840.0, 0.0)))
+    ratio = pixel_ratios([*views, far], Volume(np.zeros(3), 50.0))
+    # All have one focal length: pixels are as large as the cameras are far.
+    assert ratio[0, 4] == ratio[4, 0] == pytest.approx(np.hypot(20.0, 840.0) / 420.0)
+    assert ratio[:4, :4].max() < 1.02
+    alone = ReconstructionOptions(largest_ratio=1.5)
+    with pytest.raises(InputError, match=r"degrees apart, with pixels at most 1\.5 times"):
+        reconstruct([views[0], far], options=alone)
+
+
+def test_what_is_seen_at_a_slant_is_left_out() -> None:
+    map_ = exact_map(scenes.plane_views()[2])
+    view, normal = map_.reference, scenes.TILTED / np.linalg.norm(scenes.TILTED)
+    points = measured_points(map_).points_mm
+    rays = view.pose.position_rig_mm - points
+    slant = np.degrees(np.arccos(rays @ normal / np.linalg.norm(rays, axis=1)))
+    limit = float(np.median(slant))
+    assert np.array_equal(facing(map_, limit + 1e-9).ravel(), slant <= limit + 1e-9)
 
 
 def exact_map(view: View, stride: int = 3) -> DepthMap:

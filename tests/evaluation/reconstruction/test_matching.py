@@ -80,7 +80,8 @@ def test_gaps_are_filled_between_patches_and_a_step_beyond_their_rim() -> None:
     # A cell is 1.9 mm wide: its middle lies 1.3 mm from its corners, the middles of its sides 0.9.
     (take,) = gaps([place], points, 1.1)
     pixels = place.pixels[take]
-    made = filled(coarse, views[1:], pixels, plane[take], how, scenes.FOCAL_PX * 115.0)
+    widest = scenes.FOCAL_PX * 115.0
+    made = filled(coarse, views[1:], pixels, plane[take], how, widest, steepest_deg=70.0)
     columns, rows = made.pixels.T
     middle = (columns % 4 == 2) & (rows % 4 == 2)
     beyond = (columns % 4 == 0) & (rows % 4 == 0)
@@ -95,3 +96,6 @@ def test_gaps_are_filled_between_patches_and_a_step_beyond_their_rim() -> None:
         0
     ].pose.rotation_rig_to_camera.T
     assert np.median(np.abs(local[:, 2] - rho)) < 0.02
+    # The first camera looks at the plane at 17 degrees, its rays lie within 10 of its axis.
+    steep = filled(coarse, views[1:], pixels, plane[take], how, widest, steepest_deg=5.0)
+    assert len(steep.points_mm) == 0

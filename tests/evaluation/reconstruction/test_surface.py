@@ -86,12 +86,16 @@ def test_files_hold_what_the_mesh_holds(mesh: SurfaceMesh, tmp_path: Path) -> No
     path.write_bytes(mesh_ply(mesh))
     assert np.array_equal(read_points(path), mesh.vertices_mm)
     assert np.array_equal(read_reference(path).faces, mesh.faces)
-    obj = trimesh.load_mesh(io.BytesIO(mesh_obj(mesh)), file_type="obj", process=False)
+    obj = trimesh.load_mesh(io.BytesIO(mesh_obj(mesh)["mesh.obj"]), file_type="obj", process=False)
     # Six digits behind the point.
     assert obj.vertices == pytest.approx(mesh.vertices_mm, abs=0.6e-6)
     assert np.array_equal(obj.faces, mesh.faces)
     assert np.array_equal(obj.visual.vertex_colors[:, :3], mesh.colours)
-    told = [line.split()[1:] for line in mesh_obj(mesh).decode().splitlines() if line[:2] == "vn"]
+    told = [
+        line.split()[1:]
+        for line in mesh_obj(mesh)["mesh.obj"].decode().splitlines()
+        if line[:2] == "vn"
+    ]
     assert np.array(told, dtype=float) == pytest.approx(mesh.normals, abs=0.6e-6)
     glb = trimesh.load_scene(io.BytesIO(mesh_glb(mesh)), file_type="glb")
     (back,) = glb.geometry.values()
