@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 
 from benchmarks.pages import table
-from benchmarks.reconstruction import arguments
+from benchmarks.reconstruction import arguments, halved, head_of
 from common.errors import RigwrightError
 from evaluation.comparison.distances import Reference
 from evaluation.reconstruction.reconstructing import (
@@ -27,7 +27,7 @@ from evaluation.reconstruction.views import Coded, view_of
 from evaluation.trial.trying import judged
 from geometry.camera import RigCamera
 from rig.design.designfile import read_design
-from rig.simulation.settings import HeadSettings, MotionSettings, SceneSettings
+from rig.simulation.settings import MotionSettings, SceneSettings
 from rig.simulation.studio import Shot, Studio
 
 EXPOSURE_US = 4000.0
@@ -122,34 +122,15 @@ def main() -> None:
 
 
 def _bench(chosen: argparse.Namespace) -> tuple[Bench, Reference]:
-    head = HeadSettings(
-        scan=chosen.head,
-        texture=chosen.texture,
-        displacement=chosen.displacement,
-        flip_texture=chosen.head is not None,
-        subdivisions=2 if chosen.head is not None else 1,
-    )
     motion = MotionSettings((3.0, 0.0, 0.0), (0.0, 0.0, 1.0))
-    cameras = tuple(_halved(c) for c in read_design(chosen.design).cameras)
-    studio = Studio(cameras, SceneSettings(head=head, motion=motion))
+    cameras = tuple(halved(c) for c in read_design(chosen.design).cameras)
+    studio = Studio(cameras, SceneSettings(head=head_of(chosen), motion=motion))
     empty = Bench(cameras, studio, ())
     good = tuple(empty.shot(number) for number in range(len(cameras)))
     surface = studio.surface
     if surface is None:
         raise SystemExit("the scene has no head")
     return replace(empty, good=good), Reference(surface.vertices_mm, surface.faces)
-
-
-def _halved(camera: RigCamera) -> RigCamera:
-    kind = camera.camera
-    w, h = kind.image_size_px
-    small = replace(
-        kind,
-        image_size_px=(w // 2, h // 2),
-        pixel_pitch_mm=2.0 * kind.pixel_pitch_mm,
-        principal_point_px=(kind.principal_point_px - 0.5) / 2.0,
-    )
-    return replace(camera, camera=small)
 
 
 def _row(
