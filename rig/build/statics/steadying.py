@@ -1,4 +1,4 @@
-"""Building a mount so that it stands: feet that reach farther, until it withstands the push."""
+"""Building a mount so that it stands: bays tied together, feet that reach farther."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from rig.build.mounts.plan import Stance
 from rig.build.mounts.settings import CameraMount
 from rig.build.mounts.structure import Structure
 from rig.build.mounts.surroundings import Surroundings
-from rig.build.mounts.systems.base import Built, Spread
+from rig.build.mounts.systems.base import Built, Holding, Spread
 from rig.build.statics.stiffening import Stiffened
 from rig.build.statics.tipping import stances
 from rig.build.statics.weights import Masses
@@ -30,33 +30,44 @@ FACING = 0.5
 def steadied(
     stiff: Stiffened, cameras: tuple[RigCamera, ...], around: Surroundings, masses: Masses
 ) -> Stiffened:
-    """The same mount on feet that reach so far that nothing of it tips over.
+    """The same mount with bays tied and feet that reach so far that nothing of it tips over.
 
-    As it was where it stands already, where no feet suffice, or where these would be in the way.
+    Ties come first: they keep feet short. As it was where it stands already, where neither
+    suffices, or where they would be in the way.
     """
-    first, spread = stiff.first, Spread()
-    plain = first.build()
-    weak = worst = _weak(plain, around, masses)
-    built = plain
-    for _ in range(TRIES):
-        if not weak:
-            break
-        wider = _wider(spread, weak, built.structure)
-        if max(wider.front_mm, wider.rear_mm, wider.beside_mm) > FARTHEST_MM:
-            return stiff
-        spread = wider
-        built = first.with_spread(spread).build()
-        weak = _weak(built, around, masses)
-    if (
-        worst is weak
-        or weak
-        or _in_the_way(built, cameras, around) > _in_the_way(plain, cameras, around)
-    ):
+    plain = stiff.first.build()
+    weak = _weak(plain, around, masses)
+    if not weak:
         return stiff
-    held = first.with_spread(spread)
-    without = replace(worst[0], push_n=worst[0].push_n / ROOM)
-    words = f"Feet reach {_reach(spread)} farther: without that {without.words}."
-    return replace(stiff, system=held.system, first=held, notes=(*stiff.notes, words))
+    most = _in_the_way(plain, cameras, around)
+    for tied in (True, False):
+        start = stiff.first.with_spread(Spread(tied=tied))
+        built = start.build()
+        if tied and len(built.structure.members) == len(plain.structure.members):
+            continue
+        found = _on_its_feet(start, built, Spread(tied=tied), around, masses)
+        if found is None or _in_the_way(found[1], cameras, around) > most:
+            continue
+        held = stiff.first.with_spread(found[0])
+        without = replace(weak[0], push_n=weak[0].push_n / ROOM)
+        words = f"{_how(found[0])}: without that {without.words}."
+        return replace(stiff, system=held.system, first=held, notes=(*stiff.notes, words))
+    return stiff
+
+
+def _on_its_feet(
+    first: Holding, built: Built, spread: Spread, around: Surroundings, masses: Masses
+) -> tuple[Spread, Built] | None:
+    """Feet that reach so far that nothing tips, beginning with ``spread``; None without any."""
+    for _ in range(TRIES):
+        weak = _weak(built, around, masses)
+        if not weak:
+            return spread, built
+        spread = _wider(spread, weak, built.structure)
+        if max(spread.front_mm, spread.rear_mm, spread.beside_mm) > FARTHEST_MM:
+            return None
+        built = first.with_spread(spread).build()
+    return None if _weak(built, around, masses) else (spread, built)
 
 
 def settled_stances(
@@ -100,15 +111,24 @@ def _wider(spread: Spread, weak: list[Stance], structure: Structure) -> Spread:
             side = "front_mm" if max(ways) > -min(ways) else "rear_mm"
         lacks = max(STEP_MM, STEP_MM * float(np.ceil(stance.lacks_mm / STEP_MM)))
         more[side] = max(more[side], lacks)
-    return Spread(
-        spread.front_mm + more["front_mm"],
-        spread.rear_mm + more["rear_mm"],
-        spread.beside_mm + more["beside_mm"],
+    return replace(
+        spread,
+        front_mm=spread.front_mm + more["front_mm"],
+        rear_mm=spread.rear_mm + more["rear_mm"],
+        beside_mm=spread.beside_mm + more["beside_mm"],
     )
 
 
 def _in_the_way(built: Built, cameras: tuple[RigCamera, ...], around: Surroundings) -> int:
     return len(find_clashes(built.structure.solids, built.joined, cameras, around))
+
+
+def _how(spread: Spread) -> str:
+    """What was done, as the beginning of a sentence."""
+    reach = _reach(spread)
+    if not spread.tied:
+        return f"Feet reach {reach} farther"
+    return "The bays are tied together" + (f" and feet reach {reach} farther" if reach else "")
 
 
 def _reach(spread: Spread) -> str:

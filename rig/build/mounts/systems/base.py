@@ -15,11 +15,15 @@ from rig.build.mounts.systems.heads import HeadKind
 
 @dataclass(frozen=True)
 class Spread:
-    """By how much feet reach farther than usual, forward and back, and a row of them aside, mm."""
+    """By how much feet reach farther than usual, forward and back, and a row of them aside, mm.
+
+    ``tied``: bays that stand beside each other are one body, where the mount has such.
+    """
 
     front_mm: float = 0.0
     rear_mm: float = 0.0
     beside_mm: float = 0.0
+    tied: bool = False
 
 
 USUAL = Spread()

@@ -27,6 +27,7 @@ from rig.build.mounts.systems.hanging import Rail, hang_all, spread_order
 from rig.build.mounts.systems.heads import HeadKind
 from rig.build.mounts.systems.outrigger import Hung, Outrigger, X, Y, Z
 from rig.build.mounts.systems.stays import Stays, stayed
+from rig.build.mounts.systems.ties import tied
 from rig.catalogue.items import Profile
 
 BEHIND_MM = 90.0
@@ -38,6 +39,9 @@ SHORT_FOOT_MM = 60.0
 """How far a foot reaches forward where another bay stands beside: together they stand firm."""
 
 NARROWEST_MM = 500.0
+OPEN_CORNER = 2
+"""Of a ring of four bays: behind the subject, between the bay there and the next."""
+
 END_MM = 6.0
 """Between the bracket beside the last upright of a bay and that of its foot."""
 
@@ -244,7 +248,7 @@ class TSlotHolding:
         """See :class:`rig.build.mounts.systems.base.Holding`."""
         uprights = [_upright_member(u) for u in self.uprights]
         bases = [m for bay in self.bays for m in self._base(bay)]
-        stays = self._stays(uprights)
+        stays = self._stays(uprights) + self._ties()
         bases += stays.members
         members = [*uprights, *bases, *(m for h in self.hung for m in h.members())]
         solids = [_upright_solid(m) for m in (*uprights, *bases)]
@@ -330,6 +334,22 @@ class TSlotHolding:
             standing = [m for m in uprights if m.id in mine]
             feet, parts = self._base(bay)[2:], self.system.outrigger.stay_parts
             made += stayed(str(bay.index + 1), standing, feet, parts)
+        return made
+
+    def _ties(self) -> Stays:
+        """What makes one body of bays that stand beside each other, where that is asked for.
+
+        Of four bays one corner stays open: the subject has to get in.
+        """
+        made = Stays()
+        standing = {bay.index: bay for bay in self.bays} if self.system.spread.tied else {}
+        for bay in standing.values():
+            beside = standing.get((bay.index + 1) % 4)
+            if beside is not None and (len(standing) < 4 or bay.index != OPEN_CORNER):
+                _, _, _, right = self._base(bay)
+                _, _, left, _ = self._base(beside)
+                name = f"{bay.index + 1}-{beside.index + 1}"
+                made += tied(name, right, left, self.system.outrigger.stay_parts)
         return made
 
     def _base_joints(self, bay: Bay) -> list[Joint]:

@@ -8,12 +8,17 @@ import numpy as np
 import pytest
 from held_mounts import AROUND, four_cameras, held
 from plans import tslot_plan
+from rigs import compact_camera, face
 
+from geometry.camera import RigCamera
+from geometry.frames import Pose
 from rig.build.mounts.clashes import find_clashes
 from rig.build.mounts.plan import Give, Sag, Stance
 from rig.build.mounts.planfile import plan_document, plan_from_mapping
 from rig.build.mounts.solids import bar
 from rig.build.mounts.structure import Joint, Member, PlacedPart, Plate, Structure
+from rig.build.mounts.systemfile import system_from_mapping
+from rig.build.mounts.systems.base import Spread
 from rig.build.page.stiffness import stiffness
 from rig.build.statics.steadying import settled_stances, steadied
 from rig.build.statics.stiffening import Stiffened
@@ -159,3 +164,57 @@ def test_a_plate_of_unknown_material_is_told_and_not_taken_as_weightless() -> No
     found, notes = settled_stances(made, (), DATUM, MASSES)
     assert found == ()
     assert "unobtainium" in notes[0] and "not known" in notes[0]
+
+
+def around_it(*azimuths_deg: float) -> tuple[RigCamera, ...]:
+    """Cameras about the face at 900 mm, at angles from the front to the subject's left."""
+    middle, out = face().design_points.centroid_mm, []
+    for k, azimuth in enumerate(np.radians(azimuths_deg)):
+        way = np.array([np.sin(azimuth), -np.cos(azimuth), 0.1 * (k % 3 - 1)])
+        pose = Pose.looking_at(middle + 900.0 * way, middle)
+        out.append(RigCamera(f"c{k}", compact_camera(), pose, 900.0))
+    return tuple(out)
+
+
+@pytest.mark.parametrize(
+    ("azimuths_deg", "profile", "corners"),
+    [
+        ((-35.0, -12.0, 12.0, 85.0), "2020", 1),
+        ((-95.0, -80.0, 30.0), "4040", 1),
+        ((-90.0, 0.0, 90.0, 180.0), "3030", 3),
+    ],
+)
+def test_bays_that_would_tip_alone_are_tied_together(
+    azimuths_deg: tuple[float, ...], profile: str, corners: int
+) -> None:
+    cameras = around_it(*azimuths_deg)
+    spec = system_from_mapping({"kind": "t-slot", "profile": profile})
+    first = spec.system.hold(cameras, AROUND)
+    assert len(_stances(first, MASSES)) == corners + 1
+    mended = steadied(Stiffened(first.system, first), cameras, AROUND, MASSES)
+    (stance,) = _stances(mended.first, MASSES)
+    assert stance.stands and "The bays are tied together" in mended.notes[-1]
+    built = mended.first.build()
+    placed = tuple(mount.camera for mount in built.mounts)
+    assert find_clashes(built.structure.solids, built.joined, placed, AROUND) == ()
+    ties = [member for member in built.structure.members if member.role == "tie"]
+    brackets = [part for part in built.structure.parts if part.joint.startswith("tie")]
+    assert (len(ties), len(brackets)) == (2 * corners, 6 * corners) and built.notes == ()
+    low = [s.corners_mm[:, 2].min() for s in built.structure.solids if "tie" in s.owner]
+    assert min(low) == pytest.approx(AROUND.floor_z_mm, abs=1e-9)
+    # What is drilled and cut is told in whole millimetres: a tenth of a micrometre is rounding.
+    cut = [tie.length_mm for tie in ties]
+    assert cut == pytest.approx(np.round(cut), abs=1e-4)
+    for joint in (j for j in built.structure.joints if j.id.startswith("tie")):
+        on = next(m for m in built.structure.members if m.id == joint.on)
+        away = np.linalg.norm(joint.point_mm - on.axis_mm[0])
+        beside = on.size_mm[0] / 2.0
+        assert away == pytest.approx(np.hypot(joint.along_mm or 0.0, beside), abs=1e-6)
+
+
+def test_bays_across_from_each_other_are_not_tied() -> None:
+    first = system_from_mapping({"kind": "t-slot"}).system.hold(around_it(85.0, -85.0), AROUND)
+    built = first.with_spread(Spread(tied=True)).build()
+    assert [m.id for m in built.structure.members] == [
+        m.id for m in first.build().structure.members
+    ]
