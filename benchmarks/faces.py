@@ -18,7 +18,8 @@ from geometry.preparation import prepare_subject
 from geometry.reading import read_scan
 from rig.design.layout import make_layout
 from rig.specification.examples import example_rig
-from solver.design import best_strip, design
+from solver.beginnings import best_strip
+from solver.design import design
 from solver.quality import evaluate
 from solver.result import Design, Quality
 from solver.strategy import Strategy

@@ -130,6 +130,12 @@ class Quality:
         return all(row.satisfied for row in self.constraints)
 
     @property
+    def rank(self) -> tuple[float, float]:
+        """Less is better: feasible before infeasible by relative violation, then by cost."""
+        violation = sum(max(0.0, -r.slack) / max(abs(r.limit), 1e-3) for r in self.violated)
+        return violation, self.cost_mm2
+
+    @property
     def violated(self) -> tuple[ConstraintRow, ...]:
         """The limits that are broken."""
         return tuple(row for row in self.constraints if not row.satisfied)

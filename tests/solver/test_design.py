@@ -15,7 +15,8 @@ import rigs
 from common.errors import CancelledError, InputError
 from common.progress import Progress
 from geometry.frames import Pose
-from solver.design import _better_given, best_strip, design, unknown_to_search
+from solver.beginnings import best_strip, unknown_to_search
+from solver.design import _better_given, design
 from solver.limits import (
     BaseHeight,
     Box,
@@ -120,7 +121,7 @@ def test_a_given_start_is_returned_where_what_was_found_is_worse() -> None:
 def test_where_the_search_finds_nothing_the_classical_starts_are_tried(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("solver.design.search_networks", lambda *_: [])
+    monkeypatch.setattr("solver.beginnings.search_networks", lambda *_: [])
     found = place(rigs.face_limits(), count=3, starts=1, strategy=Strategy.EXCHANGE)
     assert {s.kind for s in found.solver.starts} == {"k-means"}
     assert "found no network" in found.solver.starts_note
