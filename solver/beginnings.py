@@ -15,12 +15,18 @@ from solver.problem import camera_at
 from solver.quality import evaluate
 from solver.request import Request
 from solver.result import Quality
+from solver.search.built import Build, built_network, filtered, next_best_views
 from solver.search.exchange import search_networks
 from solver.starts import kmeans_start, strips, turned
 from solver.strategy import Strategy
 
 _FINE = 2
 """How many networks of the search are optimised continuously."""
+
+_BUILT: dict[Strategy, Build] = {
+    Strategy.NEXT_BEST_VIEW: next_best_views,
+    Strategy.FILTERING: filtered,
+}
 
 
 def unknown_to_search(limits: Limits) -> tuple[str, ...]:
@@ -38,10 +44,10 @@ def unknown_to_search(limits: Limits) -> tuple[str, ...]:
 
 def _searches(request: Request) -> bool:
     """Whether networks are searched: not about given poses, nor where it would help nothing."""
-    if request.limits.matching.required:
+    if request.limits.matching.required and request.strategy is not Strategy.STRIP:
         # The classical starts know nothing of what can be matched.
         return request.start is None
-    asked = request.start is None and request.strategy is Strategy.EXCHANGE
+    asked = request.start is None and not request.strategy.classical
     return asked and not unknown_to_search(request.limits)
 
 
@@ -50,7 +56,7 @@ def why_classical(request: Request, jobs: list[StartJob], scores: list[Quality])
     unknown = ", ".join(unknown_to_search(request.limits))
     ignorant = f"the search does not know some of the limits ({unknown})"
     if not _searches(request):
-        asked = request.start is not None or request.strategy is Strategy.K_MEANS
+        asked = request.start is not None or request.strategy.classical
         return "" if asked else f"{ignorant}, so the classical starts were tried instead"
     tried = "so the classical starts were tried as well"
     if not jobs:
@@ -64,25 +70,22 @@ def searched(request: Request, cancel: CancelToken) -> list[StartJob]:
     """The best networks of the search among candidates, unless poses to start from are given."""
     if not _searches(request):
         return []
-    found = search_networks(
-        request.subject,
-        request.camera,
-        request.limits,
-        request.names,
-        request.fixed,
-        request.seed,
-        cancel,
-    )
+    order = request.subject, request.camera, request.limits, request.names, request.fixed
+    build = _BUILT.get(request.strategy)
+    if build is None:
+        kind, found = Strategy.EXCHANGE, search_networks(*order, request.seed, cancel)
+    else:
+        kind, found = request.strategy, built_network(*order, build, cancel)
     if cancel.is_set():
         raise CancelledError
     return [
-        StartJob(k, "exchange", request.problem(cameras), request.seed, near=True)
+        StartJob(k, kind.value, request.problem(cameras), request.seed, near=True)
         for k, cameras in enumerate(found[: min(_FINE, request.starts)])
     ]
 
 
 def classical(request: Request, first: int, cancel: CancelToken) -> list[StartJob]:
-    """The given or the k-means start, the best strip, then jittered k-means starts."""
+    """The given or the k-means start, the best strip, then jittered k-means starts; or strips."""
     subject, camera, limits, names = request.subject, request.camera, request.limits, request.names
     jobs: list[StartJob] = []
 
@@ -101,6 +104,10 @@ def classical(request: Request, first: int, cancel: CancelToken) -> list[StartJo
         )
         while len(jobs) < request.starts:
             add("given, jittered", _jittered(request, len(jobs)))
+        return jobs
+    if request.strategy is Strategy.STRIP and len(names) > 1:
+        for cameras in _best_strips(subject, camera, limits, names)[: request.starts]:
+            add("strip", cameras)
         return jobs
     add("k-means", kmeans_start(subject, camera, limits, names, request.seed))
     if request.starts > 1 and len(names) > 1:
@@ -137,5 +144,11 @@ def best_strip(
     subject: Subject, camera: Camera, limits: Limits, names: tuple[str, ...]
 ) -> tuple[RigCamera, ...]:
     """The conventional strip that meets the limits best, and at the least cost among those."""
+    return _best_strips(subject, camera, limits, names)[0]
+
+
+def _best_strips(
+    subject: Subject, camera: Camera, limits: Limits, names: tuple[str, ...]
+) -> list[tuple[RigCamera, ...]]:
     options = strips(subject, camera, limits, names)
-    return min(options, key=lambda cameras: evaluate(subject, cameras, limits).rank)
+    return sorted(options, key=lambda cameras: evaluate(subject, cameras, limits).rank)

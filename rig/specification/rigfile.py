@@ -59,7 +59,10 @@ class RigFile(StrictModel):
         description='Where starts come from: `"exchange"` searches networks among candidate poses '
         'and moves the best two; `"k-means"` clusters the points, as the source paper does, and '
         "tries the best strip and clusters jittered, as is done where the search does not do: with "
-        "spacing, symmetry, bounds or limits of a mean, or when nothing in it meets the limits. "
+        "spacing, symmetry, bounds or limits of a mean, or when nothing in it meets the limits; "
+        '`"strip"` moves strips of several spans; `"next-best-view"` moves one network '
+        'of candidates, each put where it helps those before it most; `"filtering"` moves what is '
+        "left when the candidate that is missed least goes, again and again. "
         "Where `[[start]]` poses are given it has no say.",
     )
     camera: CameraSection = Field(description="The kind of camera.")

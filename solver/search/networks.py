@@ -91,6 +91,20 @@ class Search:
             cost[some] = (norms @ pool.share) * self._shortfall_factor(count + pool.seen[some])
         return broken, cost
 
+    def costs_without(self, network: Ints, places: Ints) -> Floats:
+        """Cost (k,) of the network without the camera at each of its ``places`` (k,)."""
+        pool = self.candidates
+        whole = pool.information[network].sum(axis=0)
+        whole[:3] += pool.prior
+        count = pool.seen[network].sum(axis=0)
+        cost = np.empty(len(places))
+        for first in range(0, len(places), _AT_A_TIME):
+            some = network[places[first : first + _AT_A_TIME]]
+            norms = covariance_norms(whole - pool.information[some])
+            factor = self._shortfall_factor(count - pool.seen[some])
+            cost[first : first + _AT_A_TIME] = (norms @ pool.share) * factor
+        return cost
+
     def _broken_with_each(self, rest: Ints) -> Ints:
         among = self.too_close[np.ix_(rest, rest)]
         inside = int(np.triu(among, 1).sum())

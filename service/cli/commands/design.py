@@ -45,7 +45,7 @@ def design(
     strategy: Annotated[
         Strategy | None,
         typer.Option(
-            help="Where starts come from, instead of the rig's choice.", show_default=False
+            help="Where cameras begin, instead of the rig's choice.", show_default=False
         ),
     ] = None,
     workers: WorkersOption = None,

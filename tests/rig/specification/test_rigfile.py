@@ -291,7 +291,7 @@ LINES = {
     ),
     "matching": ({"max_angle_deg": 0.7}, "did you mean 40.11 degrees (0.7 radians)?"),
     "subject.sphere": ({"centre_mm": [0, 0, 0], "radius_mm": 0.09}, "did you mean 90 mm (0.09 me"),
-    "strategy": ("luck", "strategy is 'luck'; it should be 'exchange' or 'k-means'"),
+    "strategy": ("luck", "strategy is 'luck'; it should be 'exchange'"),
 }
 
 

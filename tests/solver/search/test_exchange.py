@@ -12,6 +12,7 @@ import pytest
 import rigs
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from made_pools import pool
 
 from common.errors import CancelledError
 from common.progress import NeverCancelled
@@ -19,7 +20,7 @@ from geometry.camera import RigCamera
 from solver.limits import BaseHeight, Coverage, HalfSpace, Limits, Zones
 from solver.quality import evaluate
 from solver.search import exchange as module
-from solver.search.candidates import Candidates, candidates
+from solver.search.candidates import candidates
 from solver.search.exchange import Found, exchange, search_networks
 from solver.search.networks import Search
 
@@ -42,30 +43,6 @@ def coarser_candidates() -> Iterator[None]:
 def networks(seed: int = 0) -> list[tuple[RigCamera, ...]]:
     return search_networks(
         rigs.face(30, 60), rigs.compact_camera(), LIMITS, rigs.names(3), (), seed, NEVER
-    )
-
-
-def pool(seed: int, count: int = 25) -> Candidates:
-    """Candidates with made-up information: places on a sphere, half of the points seen by each."""
-    rng = np.random.default_rng(seed)
-    place = rng.normal(size=(count, 3))
-    place *= 900.0 / np.linalg.norm(place, axis=1, keepdims=True)
-    seen = rng.random((count, 8)) < 0.5
-    arm = rng.normal(size=(count, 3, 3, 8))
-    matrix = np.einsum("mikp,mjkp->mijp", arm, arm) * seen[:, None, None]
-    entries = np.stack(
-        [matrix[:, i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))], axis=1
-    )
-    camera = rigs.face_cameras(rigs.face(20, 30), 1)[0]
-    return Candidates(
-        (camera,) * count,
-        entries,
-        seen,
-        np.full(8, 1.0 / 8.0),
-        0.1,
-        place,
-        np.linalg.norm(place, axis=1),
-        2,
     )
 
 
