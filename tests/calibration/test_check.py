@@ -96,6 +96,7 @@ def test_two_cameras_moved() -> None:
     only(checked(scene), Kind.CAMERA_MOVED, "cam1", "cam4")
 
 
+@pytest.mark.slow
 def test_two_of_four_cameras_far_off_are_told_from_the_two_that_stand() -> None:
     """There is no majority; but the two that stand agree, and the two that moved do not."""
     scene = face_scene(face_rig(4), rings=40, frames=5, seed=2)
@@ -267,6 +268,7 @@ def test_movements_that_could_hide_are_told() -> None:
     assert "could have gone unseen" in result.sentence
 
 
+@pytest.mark.slow
 def test_the_wrong_reference_explains_nothing() -> None:
     rng = np.random.default_rng(6)
     scene = SCENE

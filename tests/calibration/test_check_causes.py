@@ -48,6 +48,7 @@ def with_group(which: tuple[int, ...], shift_mm: Floats, turn_rad: Floats) -> Sc
     return SCENE.with_cameras(tuple(cameras))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("shift_mm", "turn_rad"),
     [((0.06, 0.06, 0.06), (0.0, 0.0, 0.0)), ((0.0, 0.0, 0.0), (2e-4, 0.0, -2e-4))],

@@ -47,10 +47,10 @@ def tip_in_file(scan: Scan) -> Floats:
 @pytest.mark.parametrize(
     ("seed", "radius_mm", "mm_per_unit", "suffix"),
     [
-        (1, 500.0, 1.0, "stl"),
+        pytest.param(1, 500.0, 1.0, "stl", marks=pytest.mark.slow),
         (2, 90.0, 10.0, "obj"),
-        (3, 120.0, 25.4, "ply"),
-        (4, 500.0, 1.0, "xyz"),
+        pytest.param(3, 120.0, 25.4, "ply", marks=pytest.mark.slow),
+        pytest.param(4, 500.0, 1.0, "xyz", marks=pytest.mark.slow),
     ],
 )
 def test_a_head_in_any_pose_crop_and_unit_stands_upright(
@@ -77,6 +77,7 @@ def test_a_head_in_any_pose_crop_and_unit_stands_upright(
     assert np.linalg.norm(found - TIP) < 5.0
 
 
+@pytest.mark.slow
 def test_a_head_without_its_face_is_refused(tmp_path: Path) -> None:
     head = plain_head()
     far = np.linalg.norm(head.vertices - TIP, axis=1) > 65.0
@@ -109,6 +110,7 @@ def test_the_owner_can_show_the_face(tmp_path: Path) -> None:
     np.testing.assert_allclose(tip_in_file(scan) @ back.T, TIP, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_a_rotation_given_is_obeyed_and_a_face_aside_is_told(tmp_path: Path) -> None:
     head = plain_head()
     askew = Rotation.from_euler("z", 25.0, degrees=True).as_matrix()
@@ -141,6 +143,7 @@ def test_a_frame_that_cannot_be_is_refused(wrong: dict[str, object]) -> None:
         ScanOptions(**wrong)  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 @pytest.mark.real_scan
 @pytest.mark.parametrize(
     ("name", "tip"),

@@ -63,6 +63,7 @@ def test_axes_of_a_plain_head_are_found(axes: Axes) -> None:
     np.testing.assert_allclose(standing.rotation_file_to_rig, axes.rotation_file_to_rig)
 
 
+@pytest.mark.slow
 @pytest.mark.real_scan
 @each_axes
 def test_axes_and_units_of_the_real_head_are_found(tmp_path: Path, axes: Axes) -> None:
@@ -169,8 +170,9 @@ def test_a_scale_overrides_units(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "solid",
-    ["sphere", *(pytest.param(solid, marks=pytest.mark.slow) for solid in ("box", "cylinder"))],
+    ["sphere", "box", "cylinder"],
 )
+@pytest.mark.slow
 def test_a_shape_without_a_face_asks_for_axes(tmp_path: Path, solid: str) -> None:
     shapes = {
         "sphere": trimesh.creation.icosphere(subdivisions=4, radius=120.0),

@@ -79,7 +79,12 @@ def refused(client: TestClient, service: Service, path: Path, **options: str) ->
     return problem
 
 
-@pytest.mark.parametrize("name", SCANS)
+LONG = {"non-manifold scrap", "ten million faces"}
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=[pytest.mark.slow] if n in LONG else []) for n in SCANS]
+)
 def test_a_bad_scan(tmp_path: Path, client: TestClient, service: Service, name: str) -> None:
     folder = tmp_path / "in"
     folder.mkdir()

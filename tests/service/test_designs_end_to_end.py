@@ -98,6 +98,7 @@ def with_limits(rig: JSON, **limits: object) -> JSON:
 
 
 class TestOverHttp:
+    @pytest.mark.slow
     def test_a_design_is_made_and_its_files_fit_its_summary(
         self, http: TestClient, completed: JSON
     ) -> None:

@@ -143,6 +143,7 @@ def half_sent(server: LiveServer, text: str) -> socket.socket:
     return opened
 
 
+@pytest.mark.slow
 def test_the_service_stops_at_once_while_requests_are_half_sent(start_server: StartServer) -> None:
     server = start_server()
     slow = [half_sent(server, HEAD + "{") for _ in range(20)]

@@ -213,6 +213,7 @@ LIKE_DESIGNS = tuple(
 """What is below these is said to be as it is below designs."""
 
 
+@pytest.mark.slow
 def test_the_guide_lists_every_setting_and_path() -> None:
     for name in Settings.model_fields:
         assert f"`{PREFIX}{name.upper()}`" in GUIDE

@@ -24,6 +24,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return made
 
 
+@pytest.mark.slow
 def test_a_person_is_enrolled_and_verified(folder: Path, tmp_path: Path) -> None:
     for name in ("model.npz", "anna.xyz"):
         shutil.copy(folder / name, tmp_path)

@@ -144,6 +144,7 @@ def test_ctrl_c_ends_a_burst_and_files_nothing(
     assert rigwright_here("sessions", "verify", tmp_path / "s").returncode == 0
 
 
+@pytest.mark.slow
 def test_devices_that_another_process_has_are_refused_with_its_name(
     tmp_path: Path, station: Path, box: FakeTrigger
 ) -> None:

@@ -131,6 +131,7 @@ def test_the_service_keeps_its_id(tmp_path: Path) -> None:
         assert store.service_uuid == first
 
 
+@pytest.mark.slow
 @settings(max_examples=25, deadline=None)
 @given(content=st.binary(max_size=4096))
 def test_files_come_back_as_they_went_in(

@@ -132,6 +132,7 @@ def test_weak_are_the_points_that_losing_one_view_hurts_most() -> None:
 # --- the moves --------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_move_that_all_but_meets_the_limits_is_finished(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -133,6 +133,7 @@ def test_starts_and_candidates_keep_to_what_is_allowed(roll: Roll) -> None:
     assert turned(given, limits) is given
 
 
+@pytest.mark.slow
 def test_a_design_holds_its_rolls_to_the_last_digit() -> None:
     subject, coverage = rigs.face(40, 120), Coverage((CoverageTier(2, 0.9),))
     free = rigs.face_limits(coverage=coverage, base_height=BaseHeight(min=0.15, max=0.5))

@@ -181,6 +181,7 @@ def jobs(count: int) -> list[StartJob]:
     return [StartJob(k, "test", problem, k) for k in range(count)]
 
 
+@pytest.mark.slow
 def test_results_come_in_the_order_of_their_jobs_whatever_the_workers() -> None:
     heard: list[int] = []
     here = run_all(jobs(2), 1, lambda start, *_: heard.append(start), NEVER)
@@ -193,6 +194,7 @@ def test_results_come_in_the_order_of_their_jobs_whatever_the_workers() -> None:
         assert one.values.tobytes() == other.values.tobytes()
 
 
+@pytest.mark.slow
 def test_a_cancelled_pool_raises_and_leaves_the_environment_as_it_was() -> None:
     before = dict(os.environ)
     cancel = threading.Event()
@@ -206,6 +208,7 @@ def test_a_cancelled_pool_raises_and_leaves_the_environment_as_it_was() -> None:
 # --- contradictions ---------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_planted_contradiction_is_named_with_what_it_would_take() -> None:
     # 0.9 of base/height between all pairs cannot be had under 0.5 of it.
     problem = Problem(

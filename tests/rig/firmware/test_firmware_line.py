@@ -24,6 +24,7 @@ WORDS = st.sampled_from(
 )
 
 
+@pytest.mark.slow
 @pytest.mark.needs_avr
 @settings(
     max_examples=150,

@@ -61,6 +61,7 @@ def test_delays_and_widths_are_exact(box: FirmwareSim, flood: bytes) -> None:
     assert set(offsets(burst, made)) == {0}
 
 
+@pytest.mark.slow
 @flooded
 def test_edges_of_every_distance_are_exact(one_box: FirmwareSim, flood: bytes) -> None:
     # 32 instants, each so far from the next. 32 and 120 ticks are where the firmware goes from one

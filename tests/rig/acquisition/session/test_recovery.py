@@ -106,6 +106,7 @@ def test_a_power_cut_at_every_step(bench: BenchMaker, steps: int) -> None:
     assert fates == {"never begun", "unknown", "committed"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("number", "code"),
     [

@@ -317,6 +317,7 @@ def designed(bench: BenchMaker, small: Design, tmp_path: Path) -> Bench:
     return made
 
 
+@pytest.mark.slow
 def test_a_design_travels_with_its_session(designed: Bench, small: Design) -> None:
     design = small
     folder = designed.session.folder

@@ -328,6 +328,7 @@ def in_a_window(story: CameraFrames, exposed: Frame) -> bool:
     )
 
 
+@pytest.mark.slow
 @settings(max_examples=600, deadline=None)
 @given(stories())
 def test_no_picture_is_ever_given_to_the_wrong_shot(

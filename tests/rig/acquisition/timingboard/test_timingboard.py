@@ -41,6 +41,7 @@ def photograph(
     return Studio(CAMERAS, scene, sensor).photograph(shot)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("pixel_format", "exposure_us", "camera"),
     [
@@ -67,6 +68,7 @@ def test_the_exposure_is_read_to_a_twentieth_of_a_millisecond(
     assert abs(stated.mid_us - (start + 0.5 * exposure_us) % BOARD.range_us) < WITHIN_US
 
 
+@pytest.mark.slow
 def test_two_instants_differ_by_the_lag_between_them() -> None:
     start, lag = 700_000.0, 1370.0
     first = read_board(photograph(start, 4000.0, "RGB8", "cam01"), BOARD)
@@ -119,6 +121,7 @@ def small(picture: np.ndarray) -> np.ndarray:
     return cv2.resize(picture, None, fx=0.4, fy=0.4, interpolation=cv2.INTER_AREA)  # type: ignore[return-value]
 
 
+@pytest.mark.slow
 def test_a_picture_exposed_twice_contradicts_itself() -> None:
     first, second = (
         photograph(start, 2000.0, "Mono16", "cam01").astype(np.uint32)

@@ -49,6 +49,7 @@ def error_us(fit: ClockFit, at_s: float, drift_ppm: float) -> float:
     return (fit.host_ns(device_ns(at, drift_ppm)) - at) / 1000.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("latency_s", "p99_us"),
     [
