@@ -31,6 +31,11 @@ class Fitted:
         """Rms residual over contrast."""
         return self.fit.noise / self.fit.step
 
+    @property
+    def patch(self) -> float:
+        """Largest mean residual of 3 x 3 pixels over contrast."""
+        return self.fit.patch / self.fit.step
+
 
 def fit_target(
     picture: Picture,

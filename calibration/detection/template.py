@@ -9,10 +9,11 @@ parameter.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from scipy.special import ndtr
 
 from calibration.detection import localmap
@@ -68,7 +69,8 @@ class TemplateFit:
     """A fitted target.
 
     ``parameters`` (SIZE,) and their ``covariance`` from the residuals; ``noise`` the rms
-    residual in grey levels; ``used`` how many pixels took part.
+    residual in grey levels, ``patch`` the largest mean residual of 3 x 3 pixels; ``used`` how
+    many pixels took part.
     """
 
     parameters: Floats
@@ -76,6 +78,7 @@ class TemplateFit:
     noise: float
     used: int
     converged: bool
+    patch: float = 0.0
 
     @property
     def centre_px(self) -> Floats:
@@ -142,7 +145,18 @@ def fit_template(
         state[BLUR] = np.clip(state[BLUR], _SMALLEST_BLUR, _LARGEST_BLUR * window.pitch_px)
         if largest < _ENOUGH_PX:
             break
-    return fit
+    if fit is None:
+        return None
+    return replace(fit, patch=_largest_patch(residual, weight, window.values.shape))
+
+
+def _largest_patch(residual: Floats, weight: Bools, shape: tuple[int, ...]) -> float:
+    """The largest mean residual of 3 x 3 pixels of a window that all take part; 0 without one."""
+    kept, counted = (
+        sliding_window_view(v.reshape(shape), (3, 3)).sum(axis=(2, 3))
+        for v in (np.where(weight, residual, 0.0), weight.astype(np.int64))
+    )
+    return float(np.abs(kept[counted == 9]).max(initial=0.0)) / 9.0
 
 
 def _prior(image_px: tuple[int, int]) -> tuple[Floats, Floats]:

@@ -165,6 +165,24 @@ def test_a_target_out_of_its_place_is_refused() -> None:
     }
 
 
+@pytest.mark.parametrize("number", [10, 11, 12])
+def test_a_card_over_a_part_of_a_ring_makes_no_other_target_of_it(number: int) -> None:
+    kind = scenes.rings()
+    # Without what a card at 100 degrees hides, the codes of the other three are that of 7.
+    kind = dataclasses.replace(kind, places=scenes.places((7, 10, 11, 12), 2, 26.0))
+    image, truth = scenes.shot(kind, scenes.camera((180, 180)), scenes.rotation(), 240.0)
+    rows, columns = np.indices(image.shape)
+    for name, within in (("ring12-007", -99.0), (f"ring12-{number:03d}", 9.0)):
+        x, y = columns - truth[name][0], rows - truth[name][1]
+        along = np.cos(np.radians(100.0)) * x + np.sin(np.radians(100.0)) * y
+        card = (np.hypot(x, y) < 32.0) & (along > within)
+        # White as the paper, with a faint shadow along its edge.
+        image[card] = np.where((along[card] > 9.0) & (along[card] < 12.0), 190, 220)
+    found = find_targets(image, plan(kind), explain=False)
+    assert set(found.ids) == set(kind.ids) - {"ring12-007", f"ring12-{number:03d}"}
+    assert ("ring12-007", Rule.FIT) in {(r.target, r.rule) for r in found.rejections}
+
+
 @pytest.mark.parametrize(
     ("change", "code", "remedy"),
     [
