@@ -44,9 +44,7 @@ def design(
     ] = None,
     strategy: Annotated[
         Strategy | None,
-        typer.Option(
-            help="Where cameras begin, instead of the rig's choice.", show_default=False
-        ),
+        typer.Option(help="Where cameras begin, instead of the rig's choice.", show_default=False),
     ] = None,
     workers: WorkersOption = None,
     as_json: JsonOption = False,
