@@ -133,8 +133,12 @@ def parse_rig(text: str, name: str = "rig", catalogue: Catalogue | None = None) 
 
 def read_rig_file(path: Path) -> RigFile:
     """The same before it is put together: as it can be handed on."""
-    data = parsed(read_text(path, "rig", "rig file"), path.name, "rig", "rig file")
-    return validated(RigFile, data, path.name)
+    return parse_rig_file(read_text(path, "rig", "rig file"), path.name)
+
+
+def parse_rig_file(text: str, name: str) -> RigFile:
+    """The same from its text; ``name`` stands in front of every error."""
+    return validated(RigFile, parsed(text, name, "rig", "rig file"), name)
 
 
 def read_rig(path: Path, catalogue: Catalogue | None = None) -> RigSpec:

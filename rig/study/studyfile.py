@@ -140,8 +140,9 @@ class StudyFile(Study):
     )
 
     def study(self) -> Study:
-        """The part that stands in no other file."""
-        return Study(**{name: getattr(self, name) for name in Study.model_fields})
+        """The part that stands in no other file; what the file leaves out is left out."""
+        said = self.model_fields_set.intersection(Study.model_fields)
+        return Study(**{name: getattr(self, name) for name in said})
 
 
 def read_study_file(path: Path) -> StudyFile:
@@ -149,5 +150,9 @@ def read_study_file(path: Path) -> StudyFile:
 
     Its paths are as they stand there: from the folder of the file.
     """
-    data = parsed(read_text(path, "study", "study file"), path.name, "study", "study file")
-    return validated(StudyFile, data, path.name)
+    return parse_study(read_text(path, "study", "study file"), path.name)
+
+
+def parse_study(text: str, name: str) -> StudyFile:
+    """The same from its text; ``name`` stands in front of every error."""
+    return validated(StudyFile, parsed(text, name, "study", "study file"), name)

@@ -34,6 +34,7 @@ from service.api import (
     sessions,
     signin,
     studies,
+    studyfiles,
     targetsets,
 )
 from service.api.addresses import Prefix
@@ -74,7 +75,7 @@ def make_app() -> FastAPI:
         generate_unique_id_function=lambda route: route.name,
     )
     resources = (
-        *(root, signin, health, metrics, scans, examples, designs, exports, studies),
+        *(root, signin, health, metrics, scans, examples, designs, exports, studies, studyfiles),
         *(plans, evaluations),
         *(rigs, liveviews, captures, rigtests, sessions, removed),
         *(targetsets, picturesets, calibrations, checks, acceptances),

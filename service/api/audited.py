@@ -7,7 +7,7 @@ import time
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from service.api.door import OPERATION, VISITOR, address_of
+from service.api.door import OPERATION, address_of, name_of
 from service.keys.audit import AuditLog
 from service.logs import request_id
 
@@ -50,10 +50,9 @@ class Audited:
             if now_s - self._last_flood_s < _FLOOD_S:
                 return
             self._last_flood_s = now_s
-        visitor = scope.get(VISITOR)
         self._log.note(
             {
-                "who": None if visitor is None else visitor.key.name,
+                "who": name_of(scope) or None,
                 "from": address_of(scope),
                 "method": scope["method"],
                 "path": scope["path"],

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from functools import partial
 
-from fastapi import APIRouter, Response
+from fastapi import APIRouter, Request, Response
 
 from service.api.context import ServiceDep
+from service.api.door import name_of
 from service.api.job_routes import JobResource
 from service.api.models import Job, problems
 from service.kinds.base import Model
@@ -39,15 +40,17 @@ resource = JobResource(CAPTURE, "captures", CaptureJob, CapturePage, with_files=
     | {200: {"model": CaptureJob, "description": "This capture was asked for before."}},
 )
 def add_capture(
-    request: CaptureRequest, response: Response, service: ServiceDep, rig: str
+    request: CaptureRequest, http: Request, response: Response, service: ServiceDep, rig: str
 ) -> Job[CaptureOutcome]:
     """Take a capture, now. The answer comes at once; follow the job for what becomes of it.
 
     The same request again is answered with 200 and the capture there is. 409 while the rig is
-    busy, 423 when its interlock is open, 503 when its box or cameras are not there.
+    busy, which says for whom, 423 when its interlock is open, 503 when its box or cameras are
+    not there.
     """
     work = StationWork(CAPTURE, partial(take_capture, request))
-    record, fresh = service.rigs.get(rig).begin(request, request.capture_id, work)
+    asked_by = name_of(http.scope) or request.operator
+    record, fresh = service.rigs.get(rig).begin(request, request.capture_id, work, asked_by)
     response.headers["Location"] = resource.location(record)
     if not fresh:
         response.status_code = 200

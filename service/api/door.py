@@ -97,6 +97,12 @@ def who_asks(ring: KeyRing, scope: Scope) -> Visitor:
     return ring.signed_in(cookie)
 
 
+def name_of(scope: Scope) -> str:
+    """Whose key a request came with; empty where none was asked for, or none was right."""
+    visitor = scope.get(VISITOR)
+    return visitor.key.name if isinstance(visitor, Visitor) else ""
+
+
 def address_of(scope: Scope) -> str:
     """Where a request comes from."""
     return str((scope.get("client") or ("unknown",))[0])

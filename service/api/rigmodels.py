@@ -17,6 +17,9 @@ class RigStatus(Model):
     name: str
     status: State
     doing: Annotated[str | None, Field(description="Where the job is that it does now.")]
+    asked_by: Annotated[
+        str, Field(description="Whose key or which operator asked for it; empty: nobody said.")
+    ] = ""
     problem: Annotated[Problem | None, Field(description="Why it is not open.")]
     trigger: TriggerStatus | None
     cameras: list[CameraStatus]

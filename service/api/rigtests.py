@@ -5,9 +5,10 @@ from __future__ import annotations
 import uuid
 from functools import partial
 
-from fastapi import APIRouter, Response
+from fastapi import APIRouter, Request, Response
 
 from service.api.context import ServiceDep
+from service.api.door import name_of
 from service.api.job_routes import JobResource
 from service.api.models import Job, problems
 from service.kinds.base import Model
@@ -39,11 +40,11 @@ resource = JobResource(RIG_TEST, "rig-tests", RigTestJob, RigTestPage, with_file
     responses=problems(400, 404, 409, 413, 422, 423, 503, 507),
 )
 def add_rig_test(
-    request: RigTestRequest, response: Response, service: ServiceDep, rig: str
+    request: RigTestRequest, http: Request, response: Response, service: ServiceDep, rig: str
 ) -> Job[RigTestOutcome]:
     """Test a rig, now. 409 while it is busy, 503 when it is not open."""
     work = StationWork(RIG_TEST, partial(run_test, request))
-    record, _ = service.rigs.get(rig).begin(request, str(uuid.uuid4()), work)
+    record, _ = service.rigs.get(rig).begin(request, str(uuid.uuid4()), work, name_of(http.scope))
     response.headers["Location"] = resource.location(record)
     return resource.document(record)
 

@@ -17,7 +17,7 @@ _STOPS = (
 )
 """Whoever sees that something goes wrong may stop it."""
 
-_READS = (*_STOPS, "verify_session_files", "sign_out")
+_READS = (*_STOPS, "verify_session_files", "read_study_files", "sign_out")
 _CONFIGURES = (
     *("add_scan", "remove_scan", "add_target_set", "propose_target_set", "remove_target_set"),
     *("add_picture_set", "remove_picture_set", "add_design", "remove_design"),

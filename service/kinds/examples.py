@@ -10,6 +10,14 @@ from typing import Any
 
 from rig.specification.examples import example_text
 
+_STUDY = """\
+schema = "rigwright.study/1"
+rigs = ["face.toml"]
+heads = ["head.ply"]
+
+[grid]
+cameras = [4, 5, 6]
+"""
 _SCAN = "5c0e6f2a"
 _DESIGN = "9b2d41c7"
 _TARGETS = "77ab90d3"
@@ -31,6 +39,10 @@ def body_examples() -> Mapping[str, Any]:
             "study": {"name": "How many?", "starts": 2, "grid": {"cameras": [4, 5, 6]}},
             "rigs": [rig],
             "scan_ids": [_SCAN],
+        },
+        "read_study_files": {
+            "study": {"name": "study.toml", "text": _STUDY},
+            "rigs": [{"name": "face.toml", "text": example_text("face")}],
         },
         "add_evaluation": {"scan_id": _SCAN, "rig": rig, "design": network},
         "add_plan": {"design_id": _DESIGN, "mount": {"kind": "t-slot"}},

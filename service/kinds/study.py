@@ -12,7 +12,7 @@ from rig.specification.rigfile import RigFile
 from rig.study.grid import choices, rig_of
 from rig.study.heads import ROLE
 from rig.study.studyfile import Study
-from service.kinds.base import Figure, JobKind, Request, Result
+from service.kinds.base import Figure, JobKind, Model, Request, Result
 from service.kinds.scanned import rig_for_scan
 
 _TRIED = 200
@@ -59,6 +59,28 @@ class StudyRequest(Request):
                 return
         if refused is not None and len(asked) < _TRIED:
             raise refused
+
+
+class FileText(Request):
+    """A file of TOML: what it is called, and what it says."""
+
+    name: Annotated[str, Field(min_length=1, max_length=200)]
+    text: Annotated[str, Field(max_length=1_000_000)]
+
+
+class StudyFiles(Request):
+    """A study file and the rig files that it names, found by their names without folders."""
+
+    study: FileText
+    rigs: Annotated[list[FileText], Field(max_length=100)]
+
+
+class ReadStudy(Model):
+    """What a study file asks for, to be sent with the ids of scans."""
+
+    study: Study
+    rigs: list[RigFile]
+    heads: Annotated[list[str], Field(description="Names of scan files, without folders.")]
 
 
 class Recommended(Result):

@@ -137,8 +137,25 @@ class StationRegistry:
 
 
 def read_stations(paths: Sequence[Path]) -> list[Station]:
-    """The stations in files. Raises :class:`InputError` for one that makes no sense."""
-    return [read_station(path) for path in paths]
+    """The stations in files.
+
+    Raises :class:`InputError` for one that makes no sense, or whose name no address can have.
+    """
+    stations = [read_station(path) for path in paths]
+    for station in stations:
+        _require_addressable(station)
+    return stations
+
+
+def _require_addressable(station: Station) -> None:
+    # Servers, proxies and browsers take both for a path, however they are written in an address.
+    if "/" in station.name or station.name in {".", ".."}:
+        raise InputError(
+            "station-name",
+            f"a station called {station.name!r} has no address in a service: it could be neither "
+            "fired nor aborted",
+            "give its station file a name without a slash that is not just dots",
+        )
 
 
 def _capture_request(job: JobRecord) -> CaptureRequest:

@@ -83,6 +83,7 @@ class StationWorker:
         self._rig: Rig | None = None
         self._problem: RigwrightError | None = None
         self._doing: JobRecord | None = None
+        self._asked_by = ""
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._serve, name=f"rig-{station.name}", daemon=True)
 
@@ -108,6 +109,11 @@ class StationWorker:
         """How the devices are (None: not open), why they are not open, and what is being done."""
         rig = self._rig
         return (None if rig is None else rig.health()), self._problem, self._doing
+
+    @property
+    def asked_by(self) -> str:
+        """Who asked for what is being done; empty where nothing is, or nobody said."""
+        return "" if self._doing is None else self._asked_by
 
     def box_abilities(self) -> TriggerCapabilities | None:
         """What the trigger box can do; None where there is none or it is not open."""
@@ -154,9 +160,12 @@ class StationWorker:
             raise self._not_open()
         rig.reset()
 
-    def begin(self, request: Request, job_id: str, work: StationWork) -> tuple[JobRecord, bool]:
+    def begin(
+        self, request: Request, job_id: str, work: StationWork, asked_by: str = ""
+    ) -> tuple[JobRecord, bool]:
         """Begin a job, and whether it is new; the same request again gives the job there is.
 
+        ``asked_by``: the name of who asks, told to whoever is refused meanwhile.
         Raises :class:`ConflictError` ``rig-busy`` and ``id-used``, :class:`DeviceError` when box
         or cameras are not there, :class:`InterlockError` when the interlock is open.
         """
@@ -167,7 +176,7 @@ class StationWorker:
                 self._require_ready(work.kind)
             record, fresh = self._context.store.jobs.begin(new, job_id)
             if fresh:
-                self._doing = record
+                self._doing, self._asked_by = record, asked_by
                 self._waiting.put((record, work))
             return record, fresh
 
@@ -209,9 +218,10 @@ class StationWorker:
             )
 
     def _busy(self, doing: JobRecord) -> ConflictError:
+        who = f", asked for by {self._asked_by!r}" if self._asked_by else ""
         return ConflictError(
             "rig-busy",
-            f"rig {self.name!r} is busy with {doing.kind} {doing.id}",
+            f"rig {self.name!r} is busy with {doing.kind} {doing.id}{who}",
             "wait until it has ended, or abort it",
         )
 

@@ -5,10 +5,8 @@ from __future__ import annotations
 from functools import cache
 from pathlib import Path
 
-from common.files.strict import validated
-from common.files.toml import parsed
 from rig.specification.examples import example_names, example_text
-from rig.specification.rigfile import RigFile
+from rig.specification.rigfile import parse_rig_file
 from service.kinds.design import RigExample
 
 
@@ -28,5 +26,4 @@ def _example(name: str) -> RigExample:
 
 
 def _read(text: str, name: str) -> RigExample:
-    data = parsed(text, name, "rig", "rig file")
-    return RigExample(name=name, rig=validated(RigFile, data, name))
+    return RigExample(name=name, rig=parse_rig_file(text, name))

@@ -9,11 +9,12 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
+from types import MappingProxyType
 from typing import TypeVar
 
 import httpx2
@@ -43,6 +44,7 @@ T = TypeVar("T")
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
 MARKED = {"X-Rigwright": "1"}
+NO_HEADERS: Mapping[str, str] = MappingProxyType({})
 RIGWRIGHT = [sys.executable, "-W", "error", "-m", "service.cli"]
 
 
@@ -66,11 +68,14 @@ class TestClient(StarletteClient):
 
 
 @contextmanager
-def running(data: Path, station: Path, **settings: object) -> Iterator[TestClient]:
-    """A service with the rig ``studio`` that a station file tells of."""
+def running(
+    data: Path, station: Path, headers: Mapping[str, str] = NO_HEADERS, **settings: object
+) -> Iterator[TestClient]:
+    """A service with the rig ``studio`` that a station file tells of, asked with ``headers``."""
     service = Service(read_settings(data_dir=data, stations=[station], **settings), QUEUED)
     try:
         with TestClient(create_app(service), raise_server_exceptions=False) as client:
+            client.headers.update(headers)
             wait_for(lambda: client.get("/v1/rigs/studio").json()["status"] != "closed")
             yield client
     finally:

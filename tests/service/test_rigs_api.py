@@ -15,11 +15,14 @@ from PIL import Image
 from service_helpers import TestClient, running, wait_for
 from stations import write_station
 
+from common.errors import InputError
 from rig.acquisition.station.stationfile import read_station
 from rig.acquisition.trigger.fake.program import FakeTrigger, start_fake
 from rig.devices.station import open_station
 from service.api.app import create_app
 from service.api.context import Service
+from service.keys.keyfile import add_key
+from service.keys.scope import Scope
 from service.kinds.queued import QUEUED
 from service.kinds.rigs import CAPTURE
 from service.settings import read_settings
@@ -81,6 +84,15 @@ def test_a_rig_tells_how_its_devices_are(rig: TestClient) -> None:
     assert problem_of(rig.get("/v1/rigs/other")) == (404, "/problems/not-found/rig")
 
 
+@pytest.mark.parametrize("name", ["box/1", "/", ".", ".."])
+def test_a_name_that_no_address_can_have_is_told_at_the_start(tmp_path: Path, name: str) -> None:
+    """It would be shown, and neither fired nor aborted: all of its addresses were not there."""
+    station = write_station(tmp_path / "in", name=name)
+    with pytest.raises(InputError, match="neither fired nor aborted") as told:
+        Service(read_settings(data_dir=tmp_path / "data", stations=[station]), QUEUED)
+    assert told.value.detail == "station-name"
+
+
 class TestCaptures:
     def test_the_next_may_be_asked_for_as_soon_as_one_is_seen_to_have_ended(
         self, rig: TestClient, monkeypatch: pytest.MonkeyPatch
@@ -135,12 +147,24 @@ class TestCaptures:
         assert pulses(box) == 1
 
     def test_a_second_one_meanwhile_is_refused_and_told_why(self, rig: TestClient) -> None:
-        job = ask(rig, shots=3, interval_us=4e5)
+        job = ask(rig, shots=3, interval_us=4e5, operator="<anna>")
         second = rig.post("/v1/rigs/studio/captures", json={"capture_id": "two"})
         assert problem_of(second) == (409, "/problems/conflict/rig-busy")
-        assert "capture one" in second.json()["detail"]
-        assert rig.get("/v1/rigs/studio").json()["doing"] == "/v1/captures/one"
+        assert "busy with capture one, asked for by '<anna>'" in second.json()["detail"]
+        now = rig.get("/v1/rigs/studio").json()
+        assert (now["doing"], now["asked_by"]) == ("/v1/captures/one", "<anna>")
         assert end(rig, job)["status"] == "completed"
+        wait_for(lambda: rig.get("/v1/rigs/studio").json()["asked_by"] == "")
+
+    def test_whose_key_it_works_for_is_told_before_what_was_typed(self, tmp_path: Path) -> None:
+        data = tmp_path / "data"
+        data.mkdir()
+        bearer = {"Authorization": f"Bearer {add_key(data, 'tablet', Scope.HARDWARE, None)[1]}"}
+        with running(data, write_station(tmp_path / "in"), bearer, require_keys=True) as rig:
+            job = ask(rig, shots=2, interval_us=4e5, operator="anna")
+            second = rig.post("/v1/rigs/studio/tests", json={"test": "self-test"})
+            assert "asked for by 'tablet'" in second.json()["detail"]
+            assert end(rig, job)["status"] == "completed"
 
     @pytest.mark.parametrize("path", ["/v1/captures/one/cancel", "/v1/rigs/studio/abort"])
     def test_stopping_files_nothing_and_frees_the_rig(

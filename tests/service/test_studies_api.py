@@ -12,6 +12,7 @@ import pytest
 from inline_studies import inline
 from service_helpers import InThisProcess, TestClient, wait_for
 
+from rig.study.studyfile import Study, read_study_file
 from service.api.app import create_app
 from service.api.context import Service
 from service.kinds.queued import QUEUED
@@ -111,3 +112,46 @@ def test_scans_that_are_read_differently_are_refused(in_process: TestClient) -> 
     answer = in_process.post("/v1/studies", json={"study": {}, "rigs": [wall()], "scan_ids": scans})
     assert answer.status_code == 422
     assert "different units or axes" in answer.json()["detail"]
+
+
+def text_of(path: str) -> JSON:
+    file = EXAMPLES / path
+    return {"name": file.name, "text": file.read_text(encoding="utf-8")}
+
+
+def test_a_study_file_is_read_as_the_command_reads_it(in_process: TestClient) -> None:
+    rigs = [text_of("studies/paper-rig.toml"), text_of("studies/wall-rig.toml")]
+    given = {"study": text_of("studies/wall.toml"), "rigs": rigs}
+    answer = in_process.post("/v1/study-files", json=given)
+    assert answer.status_code == 200, answer.text
+    read = answer.json()
+    file = read_study_file(EXAMPLES / "studies/wall.toml")
+    assert Study.model_validate_json(json.dumps(read["study"])) == file.study()
+    assert read["heads"] == ["targets.xyz"]
+    scan_id = uploaded(in_process, "targets.xyz")
+    asked = {"study": read["study"], "rigs": read["rigs"], "scan_ids": [scan_id]}
+    job = in_process.post("/v1/studies", json=asked)
+    assert job.status_code == 201, job.text
+    in_process.post(job.json()["links"]["cancel"])
+    assert read["rigs"] == [wall()]
+
+
+@pytest.mark.parametrize(
+    ("study", "told"),
+    [
+        ("", "schema"),
+        ("name = ", "my.toml"),
+        ('schema = "rigwright.study/1"\nrigs = ["b/a.toml"]', "'a.toml', which was not given"),
+        ('schema = "rigwright.study/1"\nrigs = ["b/a.toml", "c/a.toml"]', "two files"),
+        ('schema = "rigwright.study/1"\nrigs = ["wall-rig.toml"]\nhead = []', "head"),
+        ('schema = "rigwright.study/1"\nrigs = ["bad.toml"]', "bad.toml"),
+    ],
+)
+def test_a_study_file_that_cannot_be_is_told_in_one_line(
+    in_process: TestClient, study: str, told: str
+) -> None:
+    rigs = [text_of("studies/wall-rig.toml"), {"name": "bad.toml", "text": "x = 1"}]
+    given = {"study": {"name": "my.toml", "text": study}, "rigs": rigs}
+    answer = in_process.post("/v1/study-files", json=given)
+    assert answer.status_code == 422
+    assert told in answer.json()["detail"] and "\n" not in answer.json()["detail"]

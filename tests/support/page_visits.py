@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
+from urllib.parse import urlsplit
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
@@ -15,21 +17,43 @@ if TYPE_CHECKING:
 ROOT = Path(__file__).resolve().parents[2]
 
 
+class Serving:
+    """A service in a process of its own, which can be killed and begun again at its address."""
+
+    def __init__(self, data: Path, *stations: Path, more: tuple[str, ...] = ()) -> None:
+        self.address = ""
+        self._log = data.parent / "service.log"
+        self._command = [sys.executable, "-m", "service.cli", "serve", "--data", str(data)]
+        for station in stations:
+            self._command += ["--station", str(station)]
+        self._command += more
+
+    def begin(self) -> None:
+        """Start it; returns when it answers."""
+        port = urlsplit(self.address).port or 0
+        with self._log.open("a") as log:
+            self._process = subprocess.Popen(
+                [*self._command, "--port", str(port)],
+                stdout=subprocess.PIPE, stderr=log, text=True, cwd=ROOT,
+            )  # fmt: skip
+        assert self._process.stdout is not None
+        self.address = self._process.stdout.readline().split()[3].removesuffix("/v1;") + "/"
+
+    def end(self, how: signal.Signals = signal.SIGTERM) -> None:
+        """End it, and wait until it has."""
+        with self._process as process:
+            process.send_signal(how)
+
+
 @contextmanager
 def served(data: Path, *stations: Path, more: tuple[str, ...] = ()) -> Iterator[str]:
     """The address of a service with these stations."""
-    command = [sys.executable, "-m", "service.cli", "serve", "--port", "0", "--data", str(data)]
-    for station in stations:
-        command += ["--station", str(station)]
-    command += more
-    with (data.parent / "service.log").open("w") as log:
-        begun = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, text=True, cwd=ROOT)
-        with begun as process:
-            try:
-                assert process.stdout is not None
-                yield process.stdout.readline().split()[3].removesuffix("/v1;") + "/"
-            finally:
-                process.terminate()
+    serving = Serving(data, *stations, more=more)
+    serving.begin()
+    try:
+        yield serving.address
+    finally:
+        serving.end()
 
 
 class Visit:

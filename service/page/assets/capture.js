@@ -10,6 +10,7 @@ export function capturing(rig, signal) {
   const today = new Date().toLocaleDateString("sv");
   const session = h("input", { value: today, pattern: "[A-Za-z0-9][A-Za-z0-9_.\\-]{0,63}", required: true, autocomplete: "off" });
   const subject = h("input", { maxlength: 200, autocomplete: "off" });
+  const operator = h("input", { maxlength: 200, autocomplete: "off" });
   const shots = h("input", { type: "number", min: 1, max: 1000, value: 1 });
   const interval = h("input", { type: "number", min: 0, max: 1000000, value: 0 });
   const countdown = h("input", { type: "number", min: 0, max: 60, value: 0 });
@@ -24,7 +25,8 @@ export function capturing(rig, signal) {
     if (counting) { counting.abort(); return; }
     const id = captureId();
     const asked = {
-      capture_id: id, session: session.value, subject: subject.value, shots: Number(shots.value),
+      capture_id: id, session: session.value, subject: subject.value,
+      operator: operator.value, shots: Number(shots.value),
       interval_us: Number(interval.value) * 1000,
     };
     counting = new AbortController();
@@ -47,7 +49,7 @@ export function capturing(rig, signal) {
   const element = h("form", { class: "capture", onsubmit: go },
     h("p", { class: "note reader" }, "Your key may look and stop. To fire, sign in with one of scope hardware."),
     h("div", { class: "fields hardware" }, field("Session", session, "One folder of captures, for a subject or a day."),
-      field("Subject", subject, "For a new session."), field("Shots", shots), field("Between shots, ms", interval),
+      field("Subject", subject, "For a new session."), field("Operator", operator, "Who fires: told to whoever else presses Fire meanwhile."), field("Shots", shots), field("Between shots, ms", interval),
       field("Countdown, s", countdown)),
     fire, others, place);
 
@@ -55,7 +57,7 @@ export function capturing(rig, signal) {
     const busy = now.status === "busy";
     if (!counting) fire.disabled = busy || now.status === "closed";
     const other = busy && now.doing && now.doing !== own;
-    others.textContent = other ? "The rig is at work for somebody else." : "";
+    others.textContent = other ? `The rig is at work for ${now.asked_by || "somebody else"}.` : "";
     if (other && now.doing.startsWith(at("/v1/captures/"))) {
       own = now.doing; // shown here as well: everybody at the rig sees the last capture
       shown(place, now.doing, signal);

@@ -5,6 +5,7 @@ import { choice, field, figures, fill, frame, h, number, problem } from "./dom.j
 import { watch } from "./job.js";
 import { files, jobs } from "./joblist.js";
 import { rigForm } from "./rigform.js";
+import { fromFiles } from "./studyfile.js";
 
 const FORMS = [["", "as the rig says"], ["free", "free"], ["symmetric", "symmetric"], ["free symmetric", "both"]];
 
@@ -31,17 +32,14 @@ async function form(root, signal) {
   });
   const said = h("div", { "aria-live": "polite" });
   const start = h("button", { type: "submit", class: "main" }, "Compare them");
+  const chosen = () => heads.filter((box) => box.checked).map((box) => box.value);
   const go = async (event) => {
     event.preventDefault();
     start.disabled = true;
     try {
       const grid = { cameras: numbers(cameras), design_distance_mm: numbers(distances), seed: numbers(seeds), form: forms.value.split(" ").filter(Boolean) };
       const asked = Object.fromEntries(Object.entries(grid).filter(([, values]) => values.length));
-      const job = await post("/v1/studies", {
-        study: { name: name.value, starts: Number(starts.value), grid: asked }, rigs: [limits.read()],
-        scan_ids: heads.filter((box) => box.checked).map((box) => box.value),
-      }, `page-${Date.now()}-${Math.random()}`);
-      location.hash = `#/studies/${encodeURIComponent(job.id)}`;
+      await begin({ study: { name: name.value, starts: Number(starts.value), grid: asked }, rigs: [limits.read()], scan_ids: chosen() });
     } catch (error) {
       fill(said, problem(error));
       start.disabled = false;
@@ -54,10 +52,15 @@ async function form(root, signal) {
         field("Distances of neighbours, mm", distances, "Left empty: as the limits let them stand."),
         field("Form", forms), field("Seeds", seeds, "Several show how much of a difference is chance."),
         field("Starts of each design", starts), field("Begin with", example)),
-      place, start, said)
+      place, start, said, fromFiles(scans, chosen, begin))
       : h("p", {}, "There is no scan yet. ", h("a", { href: "#/design" }, "Give one under Design"), "."),
     h("h2", {}, "Studies there are"),
     await jobs("/v1/studies", "studies", (job) => (job.result ? `${job.result.name}, ${job.result.designs} designs` : "Study"), signal));
+}
+
+async function begin(asked) {
+  const job = await post("/v1/studies", asked, `page-${Date.now()}-${Math.random()}`);
+  location.hash = `#/studies/${encodeURIComponent(job.id)}`;
 }
 
 function list(value) {

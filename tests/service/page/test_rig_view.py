@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import signal
+import urllib.parse
 import urllib.request
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,9 +12,11 @@ from typing import TYPE_CHECKING
 
 import pytest
 from browsers import chromium
-from page_visits import Visit, served
+from page_visits import ROOT, Serving, Visit, served
+from service_helpers import wait_for
 from stations import write_station
 
+from rig.acquisition.trigger.fake.program import FakeTrigger, start_fake
 from service.api.reconstructions import ReconstructionBody
 from service.api.studies import StudyBody
 
@@ -20,14 +24,31 @@ if TYPE_CHECKING:
     from playwright.sync_api import Route
 
 pytestmark = pytest.mark.needs_browser
-NAME = '<img src=x onerror="document.title=1">'
+NAME = '"><img src=x onerror="window.ran=1"><svg onload="window.ran=1">'
+"""What it would do it does within a frame of being made, wherever a page takes it for markup."""
+
+SHOTS = 20
 
 
 @pytest.fixture(scope="module")
-def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+def box() -> Iterator[FakeTrigger]:
+    with start_fake() as fake:
+        yield fake
+
+
+@pytest.fixture(scope="module")
+def serving(tmp_path_factory: pytest.TempPathFactory, box: FakeTrigger) -> Iterator[Serving]:
     folder = tmp_path_factory.mktemp("lab")
-    with served(folder / "data", write_station(folder / "rig")) as found:
-        yield found
+    station = write_station(folder / "rig", url=box.url, name=NAME.replace('"', '\\"'))
+    found = Serving(folder / "data", station)
+    found.begin()
+    yield found
+    found.end()
+
+
+@pytest.fixture(scope="module")
+def address(serving: Serving) -> str:
+    return serving.address
 
 
 @pytest.fixture(scope="module")
@@ -39,6 +60,25 @@ def visits(address: str) -> Iterator[tuple[Visit, Visit]]:
 def read(address: str) -> object:
     with urllib.request.urlopen(address) as answer:  # noqa: S310 - the service of this test
         return json.load(answer)
+
+
+def sent(address: str, content: object) -> object:
+    """The answer to a POST of a file, or of anything that becomes JSON."""
+    data = content if isinstance(content, bytes) else json.dumps(content).encode()
+    kind = "application/octet-stream" if isinstance(content, bytes) else "application/json"
+    request = urllib.request.Request(address, data, {"Content-Type": kind})  # noqa: S310 - as below
+    with urllib.request.urlopen(request) as answer:  # noqa: S310 - the service of this test
+        return json.load(answer)
+
+
+def pulses(box: FakeTrigger) -> int:
+    return sum(edge.output == 1 and edge.rising for edge in box.box.edges)
+
+
+def nothing_ran(visit: Visit) -> None:
+    visit.page.wait_for_timeout(100)
+    assert visit.page.evaluate("window.ran") is None
+    assert visit.page.locator("main :is(img[src='x'], script, svg[onload])").count() == 0
 
 
 def refused(visit: Visit, address: str) -> list[str]:
@@ -72,7 +112,8 @@ def test_a_capture_is_seen_by_everybody_at_the_rig(
     shown = one.page.locator(".result h2").inner_text()
     captures = read(f"{address}v1/captures")
     assert [item["id"] for item in captures["items"]] == [shown]  # type: ignore[index]
-    assert one.page.evaluate("document.title") == "Rigwright"
+    assert one.page.locator("h1").inner_text() == NAME
+    nothing_ran(one)
     one.sound()
     other.see("Trigger box: ready")
     other.sound()
@@ -109,6 +150,97 @@ def test_a_countdown_can_be_stopped(visits: tuple[Visit, Visit], address: str) -
     one.page.get_by_role("button", name="press to stop").click()
     one.page.get_by_role("button", name="Fire", exact=True).wait_for()
     assert len(read(f"{address}v1/captures")["items"]) == before  # type: ignore[index]
+
+
+def told(**result: object) -> dict[str, object]:
+    """A list of one job that somebody gave such names; only the browser is told of it."""
+    links = {word: f"/v1/none/{word}" for word in ("self", "files", "report", "cancel", "events")}
+    job = {"id": NAME, "status": "completed", "created_at": "2026-01-31T12:00:00Z", "links": links}
+    return {"items": [{**job, "problem": None, "result": result}], "next": None}
+
+
+NAMED = {
+    "designs": told(name=NAME, cameras=3, sigma_median_mm=0.1),
+    "plans": told(name=NAME, system=NAME),
+    "calibrations": told(cameras=[{"name": NAME}], rms_px=0.1),
+    "checks": told(light="red", text=NAME),
+    "studies": told(name=NAME, designs=3),
+    "reconstructions": told(frame=NAME, points=10),
+    "comparisons": told(median_absolute_mm=0.1),
+}
+
+
+@pytest.mark.slow
+def test_markup_in_a_name_is_a_name(visits: tuple[Visit, Visit], address: str) -> None:
+    """The rig and the subject of a session have it already."""
+    one, _ = visits
+    file = urllib.parse.quote(f"{NAME}.xyz", safe="")
+    scan = (ROOT / "examples/wall/targets.xyz").read_bytes()
+    where = f"{address}v1/scans?filename={file}&units=m&up=%2Bz&front=-y&subject=object"
+    kept = sent(where, scan)
+    assert kept["filename"] == f"{NAME}.xyz"  # type: ignore[index]
+    plate = {"name": "plate", "columns": 5, "rows": 4, "square_mm": 9.0, "marker_mm": 6.0}
+    plate["dictionary"] = "DICT_4X4_50"
+    targets = {"schema": "rigwright.targets/1", "name": NAME, "plates": [plate]}
+    sent(f"{address}v1/target-sets", targets)
+    one.page.get_by_text("Live view", exact=True).click()
+    one.page.get_by_label("Look for").locator("option", has_text=NAME).wait_for(state="attached")
+    nothing_ran(one)
+    one.page.get_by_text("Live view", exact=True).click()
+    for kind, items in NAMED.items():
+        one.page.route(f"**/v1/{kind}?*", lambda route, _r, items=items: route.fulfill(json=items))
+    for view in ("Sessions", "Calibration", "Surface", "Design", "Studies", "Build"):
+        one.go(view)
+        one.page.locator("main h1").wait_for()
+        if view != "Sessions":  # they are called by letters
+            one.page.get_by_text(NAME).first.wait_for(state="attached", timeout=30_000)
+        nothing_ran(one)
+    one.page.unroute_all()
+    assert one.faults == []
+    for place in ("sessions", "design", "calibration/checks", "studies", "build"):  # not there
+        one.page.goto(f"{address}#/{place}/{urllib.parse.quote(NAME, safe='')}")
+        one.page.locator(".problem").wait_for()
+        nothing_ran(one)
+    assert one.foreign == []
+    one.faults.clear()  # the browser tells of what was not there
+    one.go("Rig")
+
+
+@pytest.mark.slow
+def test_one_fires_the_other_is_told_and_a_crash_fires_nothing_again(
+    visits: tuple[Visit, Visit], serving: Serving, box: FakeTrigger
+) -> None:
+    """As soon after each other as two people can: neither page has heard of the other's."""
+    before = len(read(f"{serving.address}v1/captures")["items"])  # type: ignore[index]
+    was = pulses(box)
+    for visit, name in zip(visits, ("anna", "bert"), strict=True):
+        visit.go("Rig")
+        visit.see("Trigger box: ready")
+        visit.page.get_by_label("Operator").fill(name)
+        visit.page.get_by_label("Shots", exact=True).fill(str(SHOTS))
+        visit.page.get_by_label("Between shots, ms").fill("500")
+    for visit in visits:
+        visit.page.get_by_role("button", name="Fire", exact=True).evaluate("b => b.click()")
+    one, other = visits
+    other.see("asked for by 'anna'")
+    wait_for(lambda: pulses(box) >= was + 2)
+    serving.end(signal.SIGKILL)
+    for visit in visits:
+        visit.see("The service does not answer")
+    serving.begin()
+    for visit in visits:
+        visit.page.locator("#service.good").wait_for()
+        visit.see("Trigger box: ready")
+    one.see("was interrupted after it may have fired")
+    newest, *older = read(f"{serving.address}v1/captures")["items"]  # type: ignore[index]
+    assert (newest["status"], len(older)) == ("interrupted", before)
+    fired = pulses(box)
+    assert fired <= was + SHOTS
+    one.page.wait_for_timeout(1500)  # thrice the time between shots, and a look of every page
+    assert pulses(box) == fired
+    assert len(read(f"{serving.address}v1/captures")["items"]) == before + 1  # type: ignore[index]
+    for visit in visits:
+        visit.faults.clear()  # the browser tells of what nobody answered
 
 
 @pytest.mark.slow
@@ -181,9 +313,21 @@ def test_a_study_is_asked_for_with_what_was_chosen(visits: tuple[Visit, Visit]) 
     one.sound()
     one.press("Compare them")
     one.see("too many wait")
+    one.page.get_by_text("From a study file", exact=True).click()
+    given = [ROOT / "examples/studies" / name for name in ("wall.toml", "wall-rig.toml")]
+    one.page.get_by_label("Study file and its rig files").set_input_files(given)
+    one.see("Not here: targets.xyz.")
+    scans[0]["filename"] = "targets.xyz"
+    one.go("Rig")
+    one.go("Studies")
+    one.page.get_by_text("From a study file", exact=True).click()
+    one.page.get_by_label("Study file and its rig files").set_input_files(given)
+    one.press("Compare as the file says")
+    one.see("too many wait")
     one.page.unroute_all()
     one.faults.clear()  # the browser tells of the refusal on its console
-    (asked,) = [StudyBody.model_validate_json(body) for body in bodies]
+    asked, as_filed = [StudyBody.model_validate_json(body) for body in bodies]
+    assert (as_filed.scan_ids, as_filed.study.grid.cameras) == (["anna"], [3, 4, 5, 6])
     grid = asked.study.grid
     assert (asked.scan_ids, grid.cameras, grid.seed) == (["anna", "bert"], [3, 4, 5], [1, 2])
     assert list(grid.form or ()) == ["free", "symmetric"]
