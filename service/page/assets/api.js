@@ -117,6 +117,10 @@ function heard(job, seen, signal) {
   return new Promise((resolve) => {
     const source = new EventSource(at(job.links.events));
     const done = () => { source.close(); resolve(); };
+    source.addEventListener("running", () => {
+      job = { ...job, status: "running" };
+      seen(job);
+    });
     source.addEventListener("progress", (event) => {
       job = { ...job, status: "running", progress: JSON.parse(event.data) };
       seen(job);

@@ -21,7 +21,8 @@ export async function watch(root, job, result, signal) {
     if (ended(job)) return;
     const at = job.progress;
     bar.value = at?.fraction ?? 0;
-    words.textContent = at ? `${at.stage}, ${Math.round(at.fraction * 100)} %${left(began, at.fraction)}` : "waits for its turn";
+    words.textContent = at ? `${at.stage}, ${Math.round(at.fraction * 100)} %${left(began, at.fraction)}`
+      : job.status === "running" ? "begins" : "waits for its turn";
     if (at?.cost > 0) {
       costs.push([at.fraction, at.cost]);
       fill(curve, sparkline(costs));

@@ -333,6 +333,26 @@ def test_a_study_is_asked_for_with_what_was_chosen(visits: tuple[Visit, Visit]) 
     assert list(grid.form or ()) == ["free", "symmetric"]
 
 
+@pytest.mark.slow
+def test_a_job_that_begins_is_seen_to_before_its_first_progress(
+    visits: tuple[Visit, Visit],
+) -> None:
+    """Of a job that only the browser is told of: its process loads for seconds."""
+    one, _ = visits
+    links = {"self": "/v1/studies/slow", "events": "/v1/studies/slow/events"}
+    job = {"id": "slow", "status": "pending", "progress": None, "links": links}
+    one.page.route("**/v1/studies/slow", lambda route: route.fulfill(json=job))
+    told = {"status": 200, "content_type": "text/event-stream"}
+    one.page.route("**/v1/studies/slow/events", lambda route: route.fulfill(**told, body=""))
+    one.page.goto(f"{one.address}#/studies/slow")
+    one.see("waits for its turn")
+    begun = 'event: running\ndata: {"status": "running"}\n\n'
+    one.page.route("**/v1/studies/slow/events", lambda route: route.fulfill(**told, body=begun))
+    one.see("begins")
+    one.page.unroute_all()
+    one.go("Rig")
+
+
 @pytest.mark.parametrize("view", ["Calibration", "Surface", "Design", "Studies", "Build"])
 def test_views_of_an_empty_service(visits: tuple[Visit, Visit], view: str) -> None:
     one, _ = visits
