@@ -16,8 +16,6 @@ import threading
 import time
 import traceback
 from collections.abc import Callable
-from contextlib import suppress
-from pathlib import Path
 from typing import Any, BinaryIO
 
 from common.errors import CancelledError, InternalError, RigwrightError, TooLargeError
@@ -30,8 +28,6 @@ FindWork = Callable[[str], Work[Any, Any]]
 """The work of a kind of job by its name: imports what it needs only then."""
 
 _PROGRESS_INTERVAL_S = 0.2
-_STEP_BACK = 5
-_AUTOGROUP = Path("/proc/self/autogroup")
 
 
 class _Reporter:
@@ -58,7 +54,7 @@ def main(find: FindWork) -> int:
     message = TaskMessage(sys.stdin.buffer.readline())
     cancel = threading.Event()
     threading.Thread(target=_obey, args=(cancel,), daemon=True).start()
-    _step_back()
+    os.nice(5)  # The service must go on answering while all cores are busy.
     limit = message.memory_limit_bytes
     if limit is not None:
         resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
@@ -72,16 +68,6 @@ def _take_standard_output() -> BinaryIO:
     out = os.fdopen(os.dup(1), "wb", buffering=0)
     os.dup2(2, 1)
     return out
-
-
-def _step_back() -> None:
-    """The service must go on answering while all cores are busy."""
-    os.nice(_STEP_BACK)
-    if os.getsid(0) != os.getpid():
-        return
-    # Where Linux shares cores out among sessions first, a session's own niceness is what counts.
-    with suppress(OSError):
-        _AUTOGROUP.write_text(str(_STEP_BACK), encoding="ascii")
 
 
 def _obey(cancel: threading.Event) -> None:

@@ -12,7 +12,6 @@ import signal
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 from common.errors import CancelledError, InputError
 from common.progress import Progress
@@ -88,8 +87,6 @@ def misbehave(task: Task[MisbehaveRequest, Misbehaved], running: Running) -> Mis
         subprocess.Popen(
             [sys.executable, "-c", f"import time; time.sleep(600) # {task.request.mark}"]
         )
-    if how == "autogroup":
-        return Misbehaved(how=Path("/proc/self/autogroup").read_text())
     if how == "threads":
         import numpy  # noqa: F401
         from threadpoolctl import threadpool_info

@@ -55,14 +55,6 @@ class TestProcessEngine:
         assert threads
         assert set(threads) == {1}
 
-    def test_its_session_steps_back_for_others(self, tmp_path: Path) -> None:
-        """Niceness alone weighs only within a session where the system groups by sessions."""
-        own = Path("/proc/self/autogroup")
-        if not own.exists() or not own.read_text():
-            pytest.skip("this system does not group by sessions")
-        # Without privileges the system takes such a wish ten times a second at most.
-        wait_for(lambda: misbehave(tmp_path, "autogroup").how.endswith(" nice 5\n"))
-
     def test_errors_cross_whole(self, tmp_path: Path) -> None:
         with pytest.raises(InputError) as caught:
             misbehave(tmp_path, "refuse")
