@@ -15,6 +15,7 @@ from geometry.arrays import Floats
 from geometry.camera import RigCamera
 from rig.build.mounts.plan import MountPlan
 from rig.build.mounts.structure import Plate
+from rig.build.parts.masses import small_part_g
 from rig.build.parts.screws import end_caps, screw_mm
 from rig.catalogue.catalogue import Catalogue
 
@@ -242,7 +243,7 @@ def _counted(counts: Counter[Sized], catalogue: Catalogue, prices: Prices) -> li
     lines = []
     for (wanted, length), count in counts.items():
         kind, part = catalogue.find(wanted)
-        mass: Any = getattr(part, "mass_g", None)
+        mass = small_part_g(part.id, length, catalogue)
         name = part.name if length is None else f"{part.name} × {length:g} mm"
         lines.append(_line(kind, (part.id, name, part.maker), count, mass, prices))
     return sorted(lines, key=lambda line: (KINDS.index(line.kind), line.part, line.name))

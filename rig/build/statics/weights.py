@@ -13,6 +13,8 @@ from geometry.camera import RigCamera
 from rig.build.mounts.settings import CameraMount
 from rig.build.mounts.structure import Structure
 from rig.build.parts.bill import PRINT_DENSITY_G_PER_CM3
+from rig.build.parts.masses import small_part_g
+from rig.build.parts.screws import screw_mm
 from rig.catalogue import Catalogue
 
 
@@ -36,9 +38,9 @@ class Masses:
             return None
         return sum(float(mass or 0.0) for mass in known) / 1e3
 
-    def of_part(self, part: str) -> float:
-        """A part of the catalogue, kg; 0 where nobody published it."""
-        return float(getattr(self.catalogue.find(part)[1], "mass_g", None) or 0.0) / 1e3
+    def of_part(self, part: str, length_mm: float | None = None) -> float:
+        """A part of the catalogue, kg, a screw ``length_mm`` long; 0 where it is not known."""
+        return float(small_part_g(part, length_mm, self.catalogue) or 0.0) / 1e3
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,5 +80,6 @@ def weights(
             mass = float(ConvexHull(solid.corners_mm).volume) * PRINT_DENSITY_G_PER_CM3 * 1e-6
             yield Weight(np.mean(solid.corners_mm, axis=0), mass, cameras[solid.owner])
     for joint in structure.joints:
-        mass = sum(masses.of_part(part) * n for part, n in joint.fasteners.items())
+        length = screw_mm(joint, structure, masses.catalogue)
+        mass = sum(masses.of_part(part, length) * n for part, n in joint.fasteners.items())
         yield Weight(joint.point_mm, mass, "", joint.id)
