@@ -13,6 +13,8 @@ from Pynite import FEModel3D
 from geometry.arrays import Floats
 from rig.build.mounts.structure import Member, Structure
 from rig.build.mounts.systems.base import Built
+from rig.build.parts.masses import small_part_g
+from rig.build.parts.screws import screw_mm
 from rig.build.statics.sag import sags
 from rig.build.statics.weights import Masses
 from rig.catalogue import load_catalogue
@@ -117,6 +119,14 @@ def shifts(built: Built) -> Mapping[str, Floats]:
             at = nearest(frame.members[joint.on], joint.point_mm)
         if at is not None:
             frame.hang(at, part.rig_from_part[:3, 3], masses.of_part(part.part))
+    for joint in structure.joints:
+        end = next((e for e in (joint.on, joint.other) if e in frame.members), None)
+        if end is not None:
+            length = screw_mm(joint, structure, CATALOGUE)
+            each = {p: small_part_g(p, length, CATALOGUE) or 0.0 for p in joint.fasteners}
+            mass_g = sum(each[p] * count for p, count in joint.fasteners.items())
+            at = nearest(frame.members[end], joint.point_mm)
+            frame.hang(at, joint.point_mm, mass_g / 1e3)
     frame.model.analyze_linear()
     return {
         mount.name: frame.moved(holders[mount.name], mount.camera.pose.position_rig_mm)
