@@ -2,6 +2,7 @@
 
 from rig.build.drawings.checksheet import check_sheets, checks_csv
 from rig.build.drawings.dxf import dxf_bytes
+from rig.build.drawings.exploded import exploded_sheets
 from rig.build.drawings.isometric import isometric_sheets
 from rig.build.drawings.items import Sheet
 from rig.build.drawings.lists import poses_csv, settings_csv, tapes_csv
@@ -16,6 +17,7 @@ from rig.build.drawings.views import view_sheets
 __all__ = [
     "check_sheets",
     "checks_csv",
+    "exploded_sheets",
     "isometric_sheets",
     "Sheet",
     "dxf_bytes",

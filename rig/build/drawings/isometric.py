@@ -48,7 +48,7 @@ def isometric_sheets(plan: MountPlan, lines: Sequence[BillLine]) -> tuple[Sheet,
     for solid, found in zip(solids, drawn, strict=True):
         style = "camera" if solid.kind in CAMERA_KINDS else "visible"
         items += [Line(segment, style) for segment in view.flat(found)]
-    items += _balloons(view, _pointed(plan, lines, solids, view))
+    items += balloons(view, _pointed(plan, lines, solids, view))
     top = A3_LANDSCAPE_MM[1] - MARGIN_MM - 6.0
     items.append(Text(view.view.title, MARGIN_MM + 5.0, top - 3.0, 2.6, bold=True))
     table = Table("Parts, numbered as in the bill", COLUMNS, tuple(_rows(lines)))
@@ -110,8 +110,11 @@ def _pointed(
     return found
 
 
-def _balloons(view: PlacedView, pointed: list[tuple[int, Floats]]) -> list[Item]:
-    """Numbers in circles in two columns beside the rig, in the order of what they point to."""
+def balloons(view: PlacedView, pointed: list[tuple[int, Floats]]) -> list[Item]:
+    """Numbers in circles in two columns beside what is drawn, in the order of what they point to.
+
+    ``pointed``: each number with its point (2,) on the paper.
+    """
     middle = float(view.origin_mm[0] + view.size_mm[0] / 2.0)
     items: list[Item] = []
     for left in (True, False):

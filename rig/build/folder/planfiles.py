@@ -87,6 +87,10 @@ class _Making:
         return drawings.isometric_sheets(self.plan, self.bill.lines)
 
     @cached_property
+    def joints(self) -> tuple[Sheet, ...]:
+        return drawings.exploded_sheets(self.plan, self.bill.lines, self.options.catalogue)
+
+    @cached_property
     def settings(self) -> tuple[Sheet, ...]:
         return drawings.setting_sheets(self.plan)
 
@@ -184,6 +188,9 @@ def _drawn(making: _Making) -> Iterable[PlanFile]:
     yield from _sheets("drawings/views", words, making.plan.name, lambda: making.views)
     words = "the rig with balloons that number it as the bill does"
     yield from _sheets("drawings/isometric", words, making.plan.name, lambda: making.isometric)
+    if making.plan.structure.joints:
+        words = "one joint of each kind, drawn apart"
+        yield from _sheets("drawings/joints", words, making.plan.name, lambda: making.joints)
 
 
 def _plates(making: _Making) -> Iterable[PlanFile]:

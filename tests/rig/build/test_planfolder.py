@@ -51,6 +51,7 @@ def test_a_folder_holds_every_file_and_a_true_manifest(tmp_path: Path) -> None:
         "parts/stock.csv",
         "parts/taps.json",
         "drawings/isometric.pdf",
+        "drawings/joints.pdf",
         "brackets/wedge-top.3mf",
     ):
         assert wanted in there
