@@ -8,7 +8,7 @@ import math
 from collections.abc import Iterable, Sequence
 
 from rig.build.drawings.figures import mm, pose_figures, setting_text
-from rig.build.mounts.plan import Give, MountPlan
+from rig.build.mounts.plan import MountPlan, set_for_weight
 
 SETTING_FIELDS = (
     "camera",
@@ -24,6 +24,7 @@ SETTING_FIELDS = (
     "measured_from",
     "gives_way_by",
     "set_more_by",
+    "set_to",
 )
 TAPE_FIELDS = ("camera", "from", "to", "length_mm")
 POSE_FIELDS = (
@@ -48,13 +49,17 @@ def csv_text(fields: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 
 def settings_csv(plan: MountPlan) -> str:
-    """A line per setting: its value, what can be set, and how far it may be off."""
+    """A line per setting: its value, what can be set, and how far it may be off.
+
+    ``value`` is that of the rig's drawing; ``set_to`` has ``set_more_by`` for its weight in it.
+    """
     found = {(t.camera, t.setting): t for t in plan.tolerances}
 
     def finite(value: float) -> str:
         return "" if math.isinf(value) else f"{abs(value):.2f}"
 
     gives = {(sag.camera, give.setting): give for sag in plan.sags for give in sag.gives}
+    sinking = {sag.camera: sag for sag in plan.sags}
     rows = []
     for mount in plan.mounts:
         for s in mount.settings:
@@ -64,14 +69,11 @@ def settings_csv(plan: MountPlan) -> str:
                 off = (finite(tolerance.plus), finite(tolerance.minus), tolerance.limit)
             span = (f"{s.step:g}", f"{s.low:g}", f"{s.high:g}")
             give = gives.get((mount.name, s.name))
-            sag = ("", "") if give is None else (f"{give.off:.3f}", f"{_more(give):g}")
-            figures = (setting_text(s), s.unit, *span, *off, s.measured_from, *sag)
+            sag = ("", "") if give is None else (f"{give.off:.3f}", f"{give.set_more:g}")
+            told = setting_text(set_for_weight(s, sinking.get(mount.name)))
+            figures = (setting_text(s), s.unit, *span, *off, s.measured_from, *sag, told)
             rows.append((mount.name, s.name, *figures))
     return csv_text(SETTING_FIELDS, rows)
-
-
-def _more(give: Give) -> float:
-    return give.aim_out if give.unit == "mm" else 0.0
 
 
 def tapes_csv(plan: MountPlan) -> str:

@@ -15,18 +15,25 @@ from rig.build.drawings.items import Item, Line, Sheet, Text
 from rig.build.drawings.layout import PlacedView, SheetView, views_of
 from rig.build.drawings.tables import Table, table_items
 from rig.build.drawings.views import plan_solids
-from rig.build.mounts.plan import Give, MountPlan, Tolerance
+from rig.build.mounts.plan import Give, MountPlan, Tolerance, set_for_weight
 from rig.build.mounts.settings import CameraMount, Setting
 from rig.solids.sight import outline
 
 SETTING_COLUMNS = ("Setting", "Set to", "Unit", "Step", "May be off by", "Measured from")
 WEIGHT_COLUMN = "For its weight"
-"""What to set more because the rig sinks under its weight; in brackets what it leans by."""
+WEIGHT_WORDS = (
+    "The rig sinks under its weight. “Set to” has “For its weight” in it already: set just that, "
+    "and the camera sinks to its place.",
+    "In brackets: what the camera gives way by where nothing is set for it; do not set it. Tapes "
+    "hold with every camera hung.",
+)
+WEIGHT_CHAIN_WORDS = "Of what is set, leave out here what is for its weight."
+WORDS_MM = 3.6
 
 TAPE_COLUMNS = ("Tape from", "to", "mm")
 LEFT_MM = MARGIN_MM + 8.0
 WIDE_MM = A4_MM[0] - 2.0 * LEFT_MM
-PICTURE_MM = (WIDE_MM / 2.0 - 4.0, 58.0)
+PICTURE_MM = (WIDE_MM / 2.0 - 4.0, 42.0)
 
 
 def setting_sheets(plan: MountPlan) -> tuple[Sheet, ...]:
@@ -49,8 +56,14 @@ def _content(
     for table in _tables(plan, mount):
         if table.rows:
             items += table_items(table, LEFT_MM, y, WIDE_MM)
-            y -= table.height_mm() + 6.0
-    items.append(fitted(Text(CHAIN_WORDS, LEFT_MM, y + 1.5, 2.0), WIDE_MM))
+            y -= table.height_mm(WIDE_MM) + 6.0
+        if WEIGHT_COLUMN in table.columns:
+            y += 2.0
+            for words in WEIGHT_WORDS:
+                items.append(fitted(Text(words, LEFT_MM, y, 2.0), WIDE_MM))
+                y -= WORDS_MM
+    words = f"{CHAIN_WORDS} {WEIGHT_CHAIN_WORDS}" if plan.sags else CHAIN_WORDS
+    items.append(fitted(Text(words, LEFT_MM, y + 1.5, 2.0), WIDE_MM))
     low = MARGIN_MM + BLOCK_MM[1] + 8.0
     for k, (title, (placed, ground)) in enumerate(maps.items()):
         x = LEFT_MM + k * (PICTURE_MM[0] + 8.0)
@@ -68,10 +81,11 @@ def _carried(mount: CameraMount) -> str:
 
 def _tables(plan: MountPlan, mount: CameraMount) -> list[Table]:
     found = {t.setting: t for t in plan.tolerances if t.camera == mount.name}
-    gives = {g.setting: g for sag in plan.sags if sag.camera == mount.name for g in sag.gives}
+    sag = next((sag for sag in plan.sags if sag.camera == mount.name), None)
+    gives = {} if sag is None else {give.setting: give for give in sag.gives}
     columns: tuple[str, ...] = SETTING_COLUMNS
     settings: tuple[tuple[str, ...], ...] = tuple(
-        _setting_row(s, found.get(s.name)) for s in mount.settings
+        _setting_row(set_for_weight(s, sag), found.get(s.name)) for s in mount.settings
     )
     if gives:
         columns = (*columns[:5], WEIGHT_COLUMN, columns[5])
@@ -82,7 +96,7 @@ def _tables(plan: MountPlan, mount: CameraMount) -> list[Table]:
     tapes = tuple((tape.start, tape.end, mm(tape.length_mm)) for tape in mount.tapes)
     pose = pose_figures(mount.camera, plan.datum_rig_mm)
     return [
-        Table("Set", columns, settings),
+        Table("Set", columns, settings, wraps=True),
         Table("Check with a tape measure", TAPE_COLUMNS, tapes),
         Table("What results: optical centre from the datum", POSE_COLUMNS, (pose,)),
         Table(
@@ -106,9 +120,9 @@ def _setting_row(setting: Setting, tolerance: Tolerance | None) -> tuple[str, ..
 
 
 def _for_weight(give: Give) -> str:
-    """What to set more; in brackets what an angle gives way by, or what is made to the figure."""
+    """What is set more; in brackets what an angle gives way by, or what is made to the figure."""
     if give.unit == "mm" and give.step > 0.0:
-        return f"{give.aim_out:+g}" if give.aim_out else "0"
+        return f"{give.set_more:+g}" if give.set_more else "0"
     return f"({fixed(give.off, 2)})"
 
 

@@ -12,24 +12,41 @@ from rig.build.drawings.items import Item, Line, Text
 from rig.build.drawings.pdf import text_width_mm
 
 ROW_MM = 4.6
+LINE_MM = 3.2
 TEXT_MM = 2.1
 PAD_MM = 1.5
 HEAD_MM = 6.0
 WIDEST_CELL_MM = 110.0
-NUMBER_LIKE = frozenset("0123456789.-+×° ∞–")
+NUMBER_LIKE = frozenset("0123456789.-+×°() ∞–")
 
 
 @dataclass(frozen=True)
 class Table:
-    """A table with a heading."""
+    """A table with a heading. ``wraps``: words of the last column go on in further lines."""
 
     title: str
     columns: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
+    wraps: bool = False
 
-    def height_mm(self) -> float:
-        """Height with its heading."""
-        return HEAD_MM + ROW_MM * (len(self.rows) + 1)
+    def height_mm(self, most_mm: float = np.inf) -> float:
+        """Height with its heading, where it may be so wide."""
+        width = self.widths_mm(most_mm)[-1]
+        more = sum(len(self.lines(row[-1], width)) - 1 for row in self.rows)
+        return HEAD_MM + ROW_MM * (len(self.rows) + 1) + LINE_MM * more
+
+    def lines(self, words: str, width_mm: float) -> list[str]:
+        """The words of a last cell as lines that fit a column so wide."""
+        if not self.wraps or not words:
+            return [words]
+        lines: list[str] = []
+        for word in words.split():
+            longer = f"{lines[-1]} {word}" if lines else word
+            if lines and text_width_mm(longer, TEXT_MM) <= width_mm - 2.0 * PAD_MM:
+                lines[-1] = longer
+            else:
+                lines.append(word)
+        return lines
 
     def widths_mm(self, most_mm: float) -> list[float]:
         """Widths of the columns: what their words need, less when that is more than there is."""
@@ -44,7 +61,9 @@ class Table:
         ]
         need = [min(width, WIDEST_CELL_MM) for width in need]
         over = sum(need) - most_mm
-        if over > 0.0:
+        if over > 0.0 and self.wraps:
+            need[-1] -= over
+        elif over > 0.0:
             spare = [max(0.0, width - 14.0) for width in need]
             share = min(1.0, over / max(sum(spare), 1e-9))
             need = [width - share * room for width, room in zip(need, spare, strict=True)]
@@ -59,13 +78,17 @@ def table_items(table: Table, left: float, top: float, most_mm: float) -> list[I
     y = top - HEAD_MM
     for index, row in enumerate((table.columns, *table.rows)):
         base = y - ROW_MM + 1.3
-        for k, words in enumerate(row):
+        *first, last = row
+        lines = table.lines(last, widths[-1])
+        for k, words in enumerate((*first, lines[0])):
             right = index > 0 and bool(words) and set(words) <= NUMBER_LIKE
             x = edges[k + 1] - PAD_MM if right else edges[k] + PAD_MM
             anchor = "end" if right else "start"
             cell = Text(words, float(x), base, TEXT_MM, anchor, bold=index == 0)
             items.append(fitted(cell, widths[k] - 2.0 * PAD_MM + 0.1))
-        y -= ROW_MM
+        for k, words in enumerate(lines[1:], 1):
+            items.append(Text(words, float(edges[-2] + PAD_MM), base - k * LINE_MM, TEXT_MM))
+        y -= ROW_MM + LINE_MM * (len(lines) - 1)
         style = "mark" if index == 0 else "thin"
         items.append(Line(np.array([[left, y], [edges[-1], y]]), style))
     items.append(Line(np.array([[left, top - HEAD_MM], [edges[-1], top - HEAD_MM]]), "mark"))

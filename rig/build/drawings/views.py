@@ -15,7 +15,7 @@ from rig.build.drawings.items import CameraMark, Dimension, Item, Line, Sheet, T
 from rig.build.drawings.layout import EDGE_MM, PlacedView, arranged, views_of
 from rig.build.drawings.tables import Table, table_items, table_sheets
 from rig.build.mounts.plan import MountPlan
-from rig.build.mounts.structure import Member, Solid
+from rig.build.mounts.structure import Member, Solid, joint_side
 from rig.solids.bodies import place_body
 from rig.solids.sight import outline
 
@@ -230,23 +230,29 @@ def _structure_tables(plan: MountPlan) -> list[Table]:
         (m.id, m.part, m.role, mm(m.length_mm), *place(m.axis_mm[0]), *place(m.axis_mm[-1]))
         for m in plan.structure.members
     )
+    named = {member.id: member for member in plan.structure.members}
     joints = tuple(
         (
             j.id,
             j.on,
             j.other,
             "–" if j.along_mm is None else mm(j.along_mm),
-            "–" if j.angle_deg is None else f"{j.angle_deg:g}",
+            "–" if j.angle_deg is None else f"{j.angle_deg:.1f}",
             *place(j.point_mm),
+            joint_side(j, named) or "–",
         )
         for j in plan.structure.joints
     )
     ends = ("from X", "Y", "Z", "to X", "Y", "Z")
     tables = [
-        Table("Members", ("Member", "Profile", "Role", "Length mm", *ends), members),
         Table(
-            "Joints",
-            ("Joint", "On", "Holds", "Along mm", "Angle °", "X mm", "Y mm", "Z mm"),
+            "Members, ends from the datum",
+            ("Member", "Profile", "Role", "Length mm", *ends),
+            members,
+        ),
+        Table(
+            "Joints, from the datum",
+            ("Joint", "On", "Holds", "Along mm", "Angle °", "X mm", "Y mm", "Z mm", "Side"),
             joints,
         ),
     ]

@@ -259,7 +259,7 @@ def make_plan(
         clashes=clashes,
         yield_share=share,
         yield_trials=count,
-        steps=assembly_steps(built.structure, built.mounts, spec.masses.catalogue),
+        steps=assembly_steps(built.structure, built.mounts, spec.masses.catalogue, found),
         notes=(*built.notes, *stiff.notes, *unknown, *tips),
         sags=found,
         stances=stand,

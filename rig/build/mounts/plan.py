@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from geometry.arrays import Floats, frozen
-from rig.build.mounts.settings import CameraMount
+from rig.build.mounts.settings import CameraMount, Setting
 from rig.build.mounts.structure import Structure
 
 GRAVITY_M_S2 = 9.81
@@ -95,9 +95,14 @@ class Give:
         return -self.step * round(self.off / self.step) + 0.0
 
     @property
+    def set_more(self) -> float:
+        """What is set more for the weight: whole steps of a slide, nothing of an angle."""
+        return self.aim_out if self.unit == "mm" else 0.0
+
+    @property
     def left(self) -> float:
         """What is left of it: of a slide when it is aimed out, of anything else all."""
-        return self.off + (self.aim_out if self.unit == "mm" else 0.0)
+        return self.off + self.set_more
 
     @property
     def share(self) -> float:
@@ -144,6 +149,13 @@ class Sag:
     def worst(self) -> Give:
         """What comes nearest to what is allowed, or goes farthest beyond."""
         return max(self.gives, key=lambda give: give.share)
+
+
+def set_for_weight(setting: Setting, sag: Sag | None) -> Setting:
+    """The setting as a builder sets it, with what is set more or less for the rig's weight."""
+    gives = () if sag is None else sag.gives
+    more = sum(give.set_more for give in gives if give.setting == setting.name)
+    return replace(setting, value=setting.value + more)
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
+from rig.build.mounts.plan import Sag, set_for_weight
 from rig.build.mounts.settings import CameraMount, Setting
-from rig.build.mounts.structure import Joint, Member, Plate, Structure, Wedge
+from rig.build.mounts.structure import Joint, Member, Plate, Structure, Wedge, joint_side
 from rig.build.parts.screws import screw_mm
 from rig.catalogue import Catalogue
 
@@ -14,9 +15,15 @@ Members = Mapping[str, Member]
 
 
 def assembly_steps(
-    structure: Structure, mounts: tuple[CameraMount, ...], catalogue: Catalogue
+    structure: Structure,
+    mounts: tuple[CameraMount, ...],
+    catalogue: Catalogue,
+    sags: tuple[Sag, ...] = (),
 ) -> tuple[str, ...]:
-    """What to do, one step after the other; screws by the lengths that the bill has."""
+    """What to do, one step after the other; screws by the lengths that the bill has.
+
+    ``sags``: how cameras sink, so that the steps say to set what their setting sheets say.
+    """
     told = tuple(_with_length(joint, structure, catalogue) for joint in structure.joints)
     structure = replace(structure, joints=told)
     steps = [_cut(structure.members)] if structure.members else []
@@ -33,12 +40,18 @@ def assembly_steps(
         "Set up the subject's head form or a pointer at the datum, and check that the mount stands "
         "level and square to it."
     )
+    sinking = {sag.camera: sag for sag in sags}
     for mount in mounts:
         mine = own[mount.name] | {mount.name}
         joints = [j for j in structure.joints if {j.on, j.other} & mine]
         steps.append(f"Hang {mount.name}: {_hang(mount, joints, structure.wedges, members)}.")
-        steps.append(_set(mount))
+        steps.append(_set(mount, sinking.get(mount.name)))
         steps.append(_check(mount))
+    if any(give.set_more for sag in sags for give in sag.gives):
+        steps.append(
+            "With every camera hung, check all tapes once more: settings hold what the rig sinks "
+            "by under its whole weight."
+        )
     return tuple(f"{k}. {text}" for k, text in enumerate(steps, 1))
 
 
@@ -101,7 +114,7 @@ def _where(joint: Joint, members: Members) -> str:
     member = members.get(joint.on)
     if member is None:
         return f", the middle {joint.along_mm:.0f} mm from its start"
-    side = member.side_of(joint.point_mm)
+    side = joint_side(joint, members)
     return (f", on its {side}" if side else "") + (
         f", the middle {joint.along_mm:.0f} mm from its {member.start}"
     )
@@ -128,8 +141,8 @@ def _with(joint: Joint) -> str:
     return f" with {parts}" if parts else ""
 
 
-def _set(mount: CameraMount) -> str:
-    figures = "; ".join(_value(setting) for setting in mount.settings)
+def _set(mount: CameraMount, sag: Sag | None) -> str:
+    figures = "; ".join(_value(setting, sag) for setting in mount.settings)
     if all(setting.step == 0.0 for setting in mount.settings):
         return (
             f"Nothing is set on {mount.name}; check its figures as drilled and printed: {figures}."
@@ -137,10 +150,16 @@ def _set(mount: CameraMount) -> str:
     return f"Set {mount.name}: {figures}."
 
 
-def _value(setting: Setting) -> str:
+def _value(setting: Setting, sag: Sag | None) -> str:
     unit = "mm" if setting.unit == "mm" else "degrees"
     digits = 0 if setting.step >= 1.0 else 1
-    return f"{setting.name} {setting.value:.{digits}f} {unit} (from {setting.measured_from})"
+    value = set_for_weight(setting, sag).value
+    more = value - setting.value
+    weight = ""
+    if more:
+        way = "more" if more > 0.0 else "less"
+        weight = f", which is {setting.value:.{digits}f} and {abs(more):g} {way} for its weight"
+    return f"{setting.name} {value:.{digits}f} {unit}{weight} (from {setting.measured_from})"
 
 
 def _check(mount: CameraMount) -> str:

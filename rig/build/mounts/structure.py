@@ -198,6 +198,24 @@ class Joint:
         object.__setattr__(self, "point_mm", frozen(self.point_mm))
 
 
+def joint_side(joint: Joint, members: Mapping[str, Member]) -> str:
+    """On which side of ``on`` a joint holds the other part, in words; nothing where it has none.
+
+    A joint that is marked on the middle line of its member says nothing itself: then it is the
+    side on which the other member passes.
+    """
+    on, other = members.get(joint.on), members.get(joint.other)
+    if on is None:
+        return ""
+    words = on.side_of(joint.point_mm)
+    if words or other is None or other.radius_mm is not None or len(other.axis_mm) != 2:
+        return words
+    first, last = other.axis_mm
+    way = last - first
+    share = float(np.clip((joint.point_mm - first) @ way / (way @ way), 0.0, 1.0))
+    return on.side_of(first + share * way)
+
+
 @dataclass(frozen=True, eq=False)
 class Structure:
     """Everything that holds the cameras. ``solids`` are what may collide or stand in a view."""

@@ -13,7 +13,7 @@ from geometry.raycast import Occluder
 from rig.build.drawings.figures import POSE_COLUMNS, mm, pose_figures, setting_text
 from rig.build.drawings.steps import plain_steps
 from rig.build.drawings.views import plan_solids
-from rig.build.mounts.plan import MountPlan
+from rig.build.mounts.plan import MountPlan, set_for_weight
 from rig.build.mounts.settings import CameraMount
 from rig.build.page.planview import plan_figure
 from rig.build.page.stiffness import stiffness
@@ -201,10 +201,12 @@ def _accuracy(plan: MountPlan) -> str:
 
 def _settings(plan: MountPlan) -> str:
     words = (
-        "What is set on each camera. In brackets how far one setting may be off, alone, before a "
-        "limit breaks. The setting sheets say where each is measured from."
+        "What is set on each camera; what is more or less for the rig's weight is in it. In "
+        "brackets how far one setting may be off, alone, before a limit breaks. The setting "
+        "sheets say where each is measured from."
     )
     found = {(t.camera, t.setting): t for t in plan.tolerances}
+    sinking = {sag.camera: sag for sag in plan.sags}
 
     def cell(mount: CameraMount, k: int) -> str:
         if k >= len(mount.settings):
@@ -212,11 +214,17 @@ def _settings(plan: MountPlan) -> str:
         s = mount.settings[k]
         unit = "°" if s.unit == "deg" else " mm"
         tolerance = found.get((mount.name, s.name))
+        told = set_for_weight(s, sinking.get(mount.name))
+        more = told.value - s.value
         slack = ""
+        if more:
+            slack = (
+                f" <small>{abs(more):g} {'more' if more > 0.0 else 'less'} for its weight</small>"
+            )
         if tolerance is not None:
             near = min(abs(tolerance.plus), abs(tolerance.minus))
-            slack = f" <small>({figure_text(near, 2)})</small>"
-        return f"{esc(s.name)} <b>{esc(setting_text(s))}</b>{unit}{slack}"
+            slack += f" <small>({figure_text(near, 2)})</small>"
+        return f"{esc(s.name)} <b>{esc(setting_text(told))}</b>{unit}{slack}"
 
     most = max((len(m.settings) for m in plan.mounts), default=0)
     rows = [(esc(m.name), *(cell(m, k) for k in range(most))) for m in plan.mounts]

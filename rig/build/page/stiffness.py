@@ -8,7 +8,7 @@ from rig.build.mounts.plan import MountPlan, Sag, Stance
 WORDS = (
     "How far each camera sinks and leans under the weight of the whole rig, with profiles as beams "
     "and joints as rigid; and how far a touch of 5 N moves it while it lasts. Whole millimetres of "
-    "the sag are aimed out: the setting sheets say what to set more, and the tapes are taken with "
+    "the sag are aimed out: the settings hold them already, and the tapes are taken with "
     "everything hung. What is left is compared with what the design allows."
 )
 TIPPING = (

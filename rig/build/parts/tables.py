@@ -9,6 +9,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from rig.build.mounts.plan import MountPlan
+from rig.build.mounts.structure import joint_side
 from rig.build.parts.bill import Bill
 from rig.build.parts.cuts import Cut
 
@@ -46,11 +47,12 @@ JOINT_COLUMNS = (
     "other",
     "along_mm",
     "angle_deg",
-    "x_mm",
-    "y_mm",
-    "z_mm",
+    "x_from_datum_mm",
+    "y_from_datum_mm",
+    "z_from_datum_mm",
     "fasteners",
     "along_from",
+    "side",
 )
 LISTED = "; "
 """Stands between ids in one cell."""
@@ -177,11 +179,12 @@ def cuts_json(cuts: tuple[Cut, ...]) -> str:
 
 
 def joints_csv(plan: MountPlan) -> str:
-    """Where each joint is marked: along the member it sits on, and its place in the rig frame.
+    """Where each joint is marked: along the member it sits on, and its place from the datum.
 
-    ``along_mm`` counts from the end that ``along_from`` names to the middle of the joint.
+    ``along_mm`` counts from the end that ``along_from`` names to the middle of the joint;
+    ``side`` is that of ``on`` where the other part lies.
     """
-    starts = {member.id: member.start for member in plan.structure.members}
+    members = {member.id: member for member in plan.structure.members}
     rows = (
         (
             joint.id,
@@ -189,9 +192,10 @@ def joints_csv(plan: MountPlan) -> str:
             joint.other,
             _figure(joint.along_mm, 1),
             _figure(joint.angle_deg, 2),
-            *(_figure(float(value), 1) for value in joint.point_mm),
+            *(_figure(float(value), 1) for value in joint.point_mm - plan.datum_rig_mm),
             LISTED.join(f"{count}x{part}" for part, count in joint.fasteners.items()),
-            starts.get(joint.on, ""),
+            members[joint.on].start if joint.on in members else "",
+            joint_side(joint, members),
         )
         for joint in plan.structure.joints
     )
@@ -200,7 +204,7 @@ def joints_csv(plan: MountPlan) -> str:
 
 def joints_json(plan: MountPlan) -> str:
     """The same as JSON."""
-    starts = {member.id: member.start for member in plan.structure.members}
+    members = {member.id: member for member in plan.structure.members}
     document = [
         {
             "joint": joint.id,
@@ -209,8 +213,12 @@ def joints_json(plan: MountPlan) -> str:
             "along_mm": _number(joint.along_mm, 1),
             "angle_deg": _number(joint.angle_deg, 2),
             "point_rig_mm": [round(float(value), 1) for value in joint.point_mm],
+            "point_from_datum_mm": [
+                round(float(value), 1) for value in joint.point_mm - plan.datum_rig_mm
+            ],
             "fasteners": dict(joint.fasteners),
-            "along_from": starts.get(joint.on, ""),
+            "along_from": members[joint.on].start if joint.on in members else "",
+            "side": joint_side(joint, members),
         }
         for joint in plan.structure.joints
     ]

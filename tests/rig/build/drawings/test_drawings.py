@@ -32,6 +32,7 @@ from rig.build.drawings.figures import fixed, setting_text
 from rig.build.drawings.frame import fitted
 from rig.build.drawings.items import Dimension, Line, Text, dimension_parts
 from rig.build.drawings.pdf import text_width_mm
+from rig.build.drawings.tables import Table, table_items
 from rig.build.mounts.settings import Setting
 
 ROOT = Path(__file__).resolve().parents[4]
@@ -101,6 +102,24 @@ def test_no_text_covers_another_and_all_are_on_the_sheet(sheets: tuple[Sheet, ..
             for others, other in placed[:k]:
                 over = np.minimum(one[2:], other[2:]) - np.maximum(one[:2], other[:2])
                 assert over.min() < 0.15, f"{words!r} over {others!r} on {sheet.title}"
+
+
+def test_no_setting_sheet_leaves_words_out() -> None:
+    for sheet in setting_sheets(tslot_plan(2)):
+        for words in (item.words for item in sheet.items if isinstance(item, Text)):
+            assert "…" not in words, f"cut off on {sheet.title}"
+
+
+def test_words_that_are_too_wide_for_a_table_go_on_below() -> None:
+    long = "the middle slot of U1 to the middle slot of the arm, right positive seen from behind"
+    table = Table("Set", ("Setting", "From"), (("across", long), ("reach", "the stub")), wraps=True)
+    items = [item for item in table_items(table, 0.0, 100.0, 60.0) if isinstance(item, Text)]
+    last = [item for item in items if item.x_mm > 10.0 and item.words != "From"]
+    assert " ".join(item.words for item in last) == f"{long} the stub"
+    rows = [item.y_mm for item in last]
+    assert rows == sorted(rows, reverse=True) and len(set(rows)) == len(rows) > 2
+    assert max(i.x_mm + text_width_mm(i.words, i.height_mm) for i in last) < 60.0
+    assert 100.0 - table.height_mm(60.0) < min(rows)
 
 
 def test_texts_can_be_read(sheets: tuple[Sheet, ...]) -> None:

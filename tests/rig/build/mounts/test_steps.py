@@ -11,7 +11,7 @@ from mounted import slider
 
 from rig.build.mounts.settings import CameraMount, Tape
 from rig.build.mounts.steps import assembly_steps as steps_with
-from rig.build.mounts.structure import Hole, Joint, Member, Plate, Structure, Wedge
+from rig.build.mounts.structure import Hole, Joint, Member, Plate, Structure, Wedge, joint_side
 from rig.catalogue import load_catalogue
 
 ORIGIN = np.zeros(3)
@@ -171,3 +171,33 @@ def test_a_joint_says_on_which_side_of_its_member_it_is(
     )
     said = f", on its {words}, the middle 300 mm from its end" if words else ", the middle 300 mm"
     assert f"to rail{said}" in " ".join(steps)
+
+
+@pytest.mark.parametrize(
+    ("along", "off_mm", "words"),
+    [
+        (1, (0.0, 0.0, 20.0), "upper side"),
+        (1, (0.0, 0.0, -20.0), "lower side"),
+        (2, (0.0, 20.0, 0.0), "side towards the subject"),
+        (2, (0.0, -20.0, 0.0), "side away from the subject"),
+    ],
+)
+def test_a_member_across_another_says_on_which_side_it_lies(
+    along: int, off_mm: tuple[float, float, float], words: str
+) -> None:
+    """An arm under its stub read as one over it, where the joint is marked on the stub's middle."""
+    middle = np.array([300.0, 0.0, 0.0])
+    ends = middle + np.array(off_mm) + np.array([[-150.0], [90.0]]) * np.eye(3)[along]
+    arm = Member("cam0 arm", "2020", "arm", ends, np.array([1.0, 0.0, 0.0]), (20.0, 20.0))
+    rail, joint = member("rail", 800.0), Joint("j1", "rail", "cam0 arm", middle, 300.0)
+    assert joint_side(joint, {"rail": rail, "cam0 arm": arm}) == words
+    made = structure(members=(rail, arm), joints=(joint,))
+    steps = assembly_steps(made, (mount("cam0", "cam0 arm"),))
+    assert f"join cam0 arm to rail, on its {words}, the middle 300 mm" in " ".join(steps)
+
+
+def test_a_member_in_line_with_another_has_no_side() -> None:
+    rail, ends = member("rail", 800.0), np.array([[800.0, 0.0, 0.0], [900.0, 0.0, 0.0]])
+    on = Member("more", "2020", "rail", ends, np.array([0.0, 1.0, 0.0]), (20.0, 20.0))
+    joint = Joint("j1", "rail", "more", np.array([800.0, 0.0, 0.0]), 800.0)
+    assert joint_side(joint, {"rail": rail, "more": on}) == ""

@@ -10,9 +10,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from plan_readers import pdf_lines
 from plans import plate_plan, tslot_plan
 
 from common.errors import InputError, NotFoundError
+from rig.build.drawings import pdf_bytes, view_sheets
 from rig.build.mounts.plan import MountPlan
 from rig.build.mounts.structure import Member
 from rig.build.parts import (
@@ -165,6 +167,17 @@ def test_joints_say_where_to_mark_the_member(tslot: MountPlan) -> None:
     assert table["joint-c1"]["fasteners"] == "2xcap-screw-m5; 2xt-nut-2020"
     document = json.loads(joints_json(tslot))["joints"]
     assert [j["joint"] for j in document] == list(table)
+    assert [j["side"] for j in document] == [row["side"] for row in table.values()]
+
+
+def test_joints_stand_in_the_list_where_the_drawing_has_them(tslot: MountPlan) -> None:
+    """The finding was one joint at two places: in the frame of the scan, and from the datum."""
+    assert np.abs(tslot.datum_rig_mm).max() > 1.0, "else the frames are the same"
+    lines = [line for page in pdf_lines(pdf_bytes(view_sheets(tslot), "x")) for line in page]
+    assert any("Joints, from the datum" in line for line in lines)
+    for row in rows(joints_csv(tslot)):
+        places = " ".join(row[f"{axis}_from_datum_mm"] for axis in "xyz")
+        assert any(line.startswith(row["joint"]) and places in line for line in lines), row
 
 
 def test_a_name_like_a_formula_stays_text(tslot: MountPlan) -> None:

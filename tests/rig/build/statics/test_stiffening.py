@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import csv
+import html
+import io
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -16,8 +20,11 @@ from rig.build.mounts.clashes import find_clashes
 from rig.build.mounts.making import SystemSpec
 from rig.build.mounts.plan import Give, MountPlan, Sag
 from rig.build.mounts.planfile import plan_document, plan_from_mapping
+from rig.build.mounts.steps import assembly_steps
 from rig.build.mounts.systemfile import system_from_mapping
+from rig.build.page.planpage import render_plan_page
 from rig.build.page.stiffness import stiffness
+from rig.build.parts import bill_of_materials
 from rig.build.statics.sag import sags
 from rig.build.statics.stiffening import advice, settled_sags, stiffened
 from rig.build.statics.weights import Masses
@@ -114,7 +121,38 @@ def test_millimetres_are_aimed_out_and_degrees_are_not() -> None:
 def test_the_sheet_says_what_to_set_more() -> None:
     lines = "\n".join(read.pdf_lines(pdf_bytes(setting_sheets(sagging(0.3)), "x"))[0])
     assert "For its weight" in lines and "+3" in lines and "(0.30)" in lines
-    assert "-2.600,3" in settings_csv(sagging(0.3))
+    assert "do not set it" in lines
+    assert "-2.600,3,563" in settings_csv(sagging(0.3))
+
+
+def test_sheet_steps_list_and_page_say_to_set_the_same() -> None:
+    """The finding was a builder who followed the steps and set a millimetre too much."""
+    plan = sagging(0.3)
+    mount = plan.mounts[0]
+    lines = read.pdf_lines(pdf_bytes(setting_sheets(plan), "x"))[0]
+    sheet = read.settings_in(lines)
+    listed = [row for row in csv.DictReader(io.StringIO(settings_csv(plan)))
+              if row["camera"] == mount.name]  # fmt: skip
+    steps = " ".join(assembly_steps(plan.structure, plan.mounts, CATALOGUE, plan.sags))
+    page = html_words(render_plan_page(plan, bill_of_materials(plan, CATALOGUE), ()))
+    assert {row["setting"]: float(row["set_to"]) for row in listed} == sheet
+    for setting in mount.settings:
+        more = 3.0 if setting.unit == "mm" else 0.0
+        assert sheet[setting.name] == setting.value + more
+        told = f"{setting.name} {sheet[setting.name]:.0f} "
+        assert f"{told}{'mm' if more else 'degrees'}" in steps
+        assert f"{told}{'mm 3 more for its weight' if more else '°'}" in page
+    assert "which is 560 and 3 more for its weight" in steps
+    # The way to the camera counts without it: so the sheet still gives the camera's pose.
+    centre, _ = read.chain_pose(lines, mount.values())
+    off = centre - (mount.camera.pose.position_rig_mm - plan.datum_rig_mm)
+    # Rows to 0.01 mm and 0.001 degree, as where sheets without a weight are read.
+    assert np.abs(off).max() < 0.05
+    assert any("leave out here what is for its weight" in line for line in lines)
+
+
+def html_words(page: str) -> str:
+    return " ".join(html.unescape(re.sub(r"<[^>]+>", " ", page)).split())
 
 
 def test_the_page_shows_it_and_the_file_keeps_it() -> None:
