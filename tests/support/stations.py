@@ -14,11 +14,19 @@ from rig.design.designfile import placed_camera
 
 
 def write_station(
-    folder: Path, *, url: str = "fake:", cameras: int = 2, name: str = "studio", more: str = ""
+    folder: Path,
+    *,
+    url: str = "fake:",
+    cameras: int = 2,
+    name: str = "studio",
+    more: str = "",
+    width_px: int = 96,
 ) -> Path:
     """A station file with its design in ``folder``; ``more`` is put at its end."""
     folder.mkdir(parents=True, exist_ok=True)
-    camera = compact_camera(image_size_px=(96, 64), pixel_pitch_mm=23.1 / 96)
+    camera = compact_camera(
+        image_size_px=(width_px, width_px * 2 // 3), pixel_pitch_mm=23.1 / width_px
+    )
     placed = []
     for k, camera_name in enumerate(names(cameras)):
         place = (120.0 * k - 60.0 * (cameras - 1), -800.0, 0.0)
