@@ -32,6 +32,8 @@ NUMBERS = re.compile(r"^(float|int|Floats|tuple\[(float|int)\b)")
 DIMENSIONLESS = {
     "rig.acquisition.session.naming.BOX_ID_LENGTH": "characters",
     "rig.acquisition.trigger.faultscript.FaultRates.delay": "a probability",
+    "rig.build.parts.masses.PITCH_DEPTH": "in pitches",
+    "rig.build.parts.masses.SOCKET_DEPTH": "in diameters",
     "rig.build.wedges.engraving.LINE_PITCH": "in heights of a capital",
     "rig.build.wedges.lettering.Words.width": "in heights of a capital",
     "rig.report.surface.REACH_IN_SPACINGS": "so many",
