@@ -32,6 +32,9 @@ _BLOCK_PX = 4
 """A triangle that no camera sees whole has a block of one colour, that of its points."""
 
 
+_SHEET_GROWS = 1.05
+
+
 @dataclass(frozen=True, eq=False)
 class Texture:
     """A picture on a surface.
@@ -136,16 +139,28 @@ def _blocks(mesh: SurfaceMesh, unseen: Bools, first: int) -> _Piece:
     return _Piece(image, first + np.arange(3 * count), middle.repeat(3, axis=0))
 
 
-def _packed(pieces: Sequence[_Piece], count: int, largest_px: int) -> tuple[Bytes, Floats]:
-    """All pieces in one picture, and the places (W, 2) of the split vertices in it, 0 to 1."""
+def sheet_corners(sizes: Ints) -> Ints:
+    """Where rectangles (P, 2) begin on the smallest square sheet on which they find room, (P, 2).
+
+    A long strip would have to be made smaller where a square needs not.
+    """
     # Imported here: trimesh takes a third of a second.
     from trimesh.path.packing import rectangles
 
+    side = float(max(sizes.max(), np.sqrt(sizes.prod(axis=1).sum())))
+    while True:
+        found, taken = rectangles(
+            sizes.astype(np.float64), size=(side, side), rotate=False, iterations=10, seed=0
+        )
+        if taken.all():
+            return np.asarray(np.rint(found[:, 0]).astype(np.int64))
+        side *= _SHEET_GROWS
+
+
+def _packed(pieces: Sequence[_Piece], count: int, largest_px: int) -> tuple[Bytes, Floats]:
+    """All pieces in one picture, and the places (W, 2) of the split vertices in it, 0 to 1."""
     sizes = np.array([piece.image.shape[1::-1] for piece in pieces])
-    found, taken = rectangles(sizes.astype(np.float64), rotate=False, seed=0)
-    if not taken.all():
-        raise AssertionError("a sheet without a size holds all pieces")
-    corner = np.rint(found[:, 0]).astype(np.int64)
+    corner = sheet_corners(sizes)
     width, height = (corner + sizes).max(axis=0)
     image = np.zeros((height, width, 3), dtype=np.uint8)
     uv = np.zeros((count, 2))

@@ -14,7 +14,7 @@ from PIL import Image
 from common.errors import InputError
 from evaluation.reconstruction.meshfile import mesh_files
 from evaluation.reconstruction.surface import SurfaceMesh
-from evaluation.reconstruction.texture import Texture, textured
+from evaluation.reconstruction.texture import Texture, sheet_corners, textured
 from evaluation.reconstruction.views import View
 
 RADIUS_MM = 30.0
@@ -141,6 +141,18 @@ def test_an_atlas_is_no_larger_than_cards_take(mesh: SurfaceMesh, views: list[Vi
     true = colour_of(middle / np.linalg.norm(middle, axis=1, keepdims=True))
     there = seen(small)
     assert np.median(np.abs(shown_at(small) / true - 0.944)[there]) < 0.1
+
+
+def test_pieces_lie_beside_one_another_on_a_sheet_that_is_no_strip() -> None:
+    sizes = np.array([(60, 67), (58, 67), (30, 67), (61, 60), (60, 67), (12, 9), (59, 66)])
+    low = sheet_corners(sizes)
+    high = low + sizes
+    assert (low >= 0).all()
+    for k in range(len(sizes)):
+        overlap = np.minimum(high[k], high) - np.maximum(low[k], low)
+        assert (overlap > 0).all(axis=1).sum() == 1
+    # Three by two of the larger ones: 3 x 61 wide. As a strip they would be 340 wide.
+    assert high.max() < 1.1 * 3 * 61
 
 
 def test_files_show_the_picture_where_the_mesh_has_it(mesh: SurfaceMesh, texture: Texture) -> None:
