@@ -4,7 +4,8 @@
 takes the cameras of ``--design DESIGN.json``; without a head the bundled one is photographed. With
 ``--calibrated`` there is a second column: the same pictures with poses and lenses that are not
 known but found from captures of targets that the same simulated cameras took; that cloud is put
-onto the head by best fit (rigid, no scale). ``--half`` halves the pictures. ``--kept FOLDER`` keeps
+onto the head by best fit (rigid, no scale). ``--half`` halves the pictures, ``--stride`` is the
+pixels between points. ``--kept FOLDER`` keeps
 pictures there, and takes those that are there already: of the same design, head and studio only.
 """
 
@@ -23,7 +24,11 @@ from benchmarks.calibrated_cameras import calibrated, photographed
 from benchmarks.pages import table
 from evaluation.comparison.alignment import best_fit
 from evaluation.comparison.distances import Reference
-from evaluation.reconstruction.reconstructing import Reconstruction, reconstruct
+from evaluation.reconstruction.reconstructing import (
+    Reconstruction,
+    ReconstructionOptions,
+    reconstruct,
+)
 from evaluation.reconstruction.views import Coded, view_of
 from evaluation.reconstruction.volume import common_volume
 from evaluation.trial.trying import judged
@@ -47,13 +52,14 @@ def main() -> None:
     if studio.surface is None:
         raise SystemExit("the scene has no head")
     truth = Reference(studio.surface.vertices_mm, studio.surface.faces)
-    known = figures_of(images, cameras, cameras, truth)
+    options = ReconstructionOptions(stride_px=chosen.stride)
+    known = figures_of(images, cameras, cameras, truth, options)
     columns = {"value": known}
     if chosen.calibrated:
         found = _calibrated(cameras, images, chosen.captures, chosen.kept)
         columns = {
             "known cameras": known,
-            "calibrated": figures_of(images, found, cameras, truth, fit=True),
+            "calibrated": figures_of(images, found, cameras, truth, options, fit=True),
         }
     rows = [(name, *(column[name] for column in columns.values())) for name in known]
     print(table(("figure", *columns), rows))
@@ -81,6 +87,7 @@ def figures_of(
     cameras: Sequence[RigCamera],
     true: Sequence[RigCamera],
     truth: Reference,
+    options: ReconstructionOptions,
     *,
     fit: bool = False,
 ) -> dict[str, str]:
@@ -91,7 +98,7 @@ def figures_of(
     """
     views = [view_of(image, camera) for image, camera in zip(images, cameras, strict=True)]
     begin, cpu = time.perf_counter(), time.process_time()
-    done = reconstruct(views)
+    done = reconstruct(views, options=options)
     wall, busy = time.perf_counter() - begin, time.process_time() - cpu
     if fit:
         done = _fitted(done, truth)
@@ -159,6 +166,7 @@ def sized_arguments(description: str | None) -> argparse.ArgumentParser:
     parser = arguments(description)
     parser.add_argument("--half", action="store_true")
     parser.add_argument("--kept", type=Path)
+    parser.add_argument("--stride", type=int, default=ReconstructionOptions().stride_px)
     return parser
 
 
