@@ -111,9 +111,10 @@ def _table(acceptance: Acceptance) -> Flowable:
     from reportlab.platypus import Table
 
     head = ("Line", "Length", "calibrated, mm", "error, um", "sigma, um", "limit, um", "state")
+    lines = {name: k for k, name in enumerate(dict.fromkeys(m.line for m in acceptance.lengths), 1)}
     rows = [
         (
-            m.line,
+            f"{lines[m.line]}: {m.line}",
             f"{m.first} - {m.second}",
             f"{m.calibrated_mm:.4f}",
             f"{m.error_um:+.1f}",
@@ -158,7 +159,10 @@ def _plot(acceptance: Acceptance) -> Drawing:
         x, y = place(m.calibrated_mm, m.error_um)
         colour = COLOURS[Outcome.PASSED if m.within else Outcome.FAILED]
         drawing.add(Circle(x, y, 2.0, fillColor=HexColor(colour), strokeWidth=0))
-    drawing.add(String(0, height - 9, f"{top:.0f} um", fontSize=7))
-    drawing.add(String(0, 2, f"-{top:.0f} um", fontSize=7))
-    drawing.add(String(width - 60, height / 2 - 10, f"{longest:.0f} mm", fontSize=7))
+    drawing.add(String(0, height - 9, f"error: {top:+.0f} um at the top", fontSize=7))
+    drawing.add(String(0, 12, f"{-top:+.0f} um at the foot; red: the limit", fontSize=7))
+    for tick in range(0, int(longest) + 1, 50):
+        x, middle = place(float(tick), 0.0)
+        drawing.add(Line(x, middle - 2.0, x, middle + 2.0, strokeColor=grey))
+        drawing.add(String(x, 2, f"{tick} mm", fontSize=7, textAnchor="middle"))
     return drawing

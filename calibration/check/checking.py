@@ -265,9 +265,9 @@ def _notes(epoch: Epoch, diagnosis: Diagnosis, reference: Calibration) -> tuple[
             f"{epoch.unknown_rows} image points of targets unknown to the reference were left out."
         )
     out += [
-        f"{row.name} stands {words.length(row.shift_mm)} from where it stood before the same "
-        "cameras; that does no harm."
+        f"{row.name} is {words.length(row.shift_mm)} from where it was before the same cameras; "
+        "that does no harm."
         for row in carrier_checks(diagnosis, reference, ())
-        if row.shift_mm > SHIFT_NOTE_MM
+        if row.shift_mm > SHIFT_NOTE_MM and not diagnosis.accepted
     ]
     return tuple(out)

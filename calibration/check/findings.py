@@ -161,11 +161,16 @@ def _gross(corrected: Corrected, diagnosis: Diagnosis) -> list[Finding]:
 
 
 def scale_estimate(diagnosis: Diagnosis, cause: Cause, subject: int) -> tuple[float, float]:
-    """Relative size of a carrier (or of all) against the reference, less 1, and its sigma."""
-    first = diagnosis.first
+    """Relative size of a carrier (or of all) against the reference, less 1, and its sigma.
+
+    Where cameras were found to have changed, with these changes accounted for: what they bend
+    would be told of the carriers a second time.
+    """
+    of_cameras = all(h.cause in (Cause.POSE, Cause.LENS) for h in diagnosis.accepted)
+    done = diagnosis.last if of_cameras else diagnosis.first
     for h in diagnosis.tests.hypotheses:
         if h.cause is cause and h.subject == subject:
-            change, covariance = estimate(h, first.linear, first.score)
+            change, covariance = estimate(h, done.linear, done.score)
             return float(change[0]), float(np.sqrt(covariance[0, 0]))
     return float("nan"), float("nan")
 

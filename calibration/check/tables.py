@@ -72,16 +72,18 @@ def camera_checks(
 def _camera(
     diagnosis: Diagnosis, found: Effects, noise: Noise, k: int, hidden_limit_mm: float
 ) -> CameraCheck:
-    first = diagnosis.first
-    epoch = first.linear.epoch
+    accepted = {h.cause for h in diagnosis.accepted if h.subject == k}
+    # A camera that stands is shown without what others' changes did to it through the targets.
+    blamed = diagnosis.nobody_stands or accepted & {Cause.POSE, Cause.LENS}
+    shown = diagnosis.first if blamed else diagnosis.last
+    epoch = shown.linear.epoch
     own = epoch.camera == k
-    residual = first.v * epoch.sigma_px
+    residual = shown.v * epoch.sigma_px
     mine = residual[own]
     pose, lens = _test(diagnosis, Cause.POSE, k), _test(diagnosis, Cause.LENS, k)
-    sees = sensitivity(k, first.linear.spread, found, Columns.of(epoch))
+    sees = sensitivity(k, diagnosis.first.linear.spread, found, Columns.of(epoch))
     px, mm = _pose_effect(diagnosis, found, k)
     verdict, reason = Kind.FINE, ""
-    accepted = {h.cause for h in diagnosis.accepted if h.subject == k}
     if diagnosis.nobody_stands:
         verdict, reason = Kind.CANNOT_TELL, "most cameras changed"
     elif Cause.POSE in accepted:

@@ -43,6 +43,13 @@ HEADLINES = {
     Light.RED: "Stop: something has changed",
 }
 
+NEXT = {
+    Light.GREEN: "Next: work, and check again tomorrow.",
+    Light.YELLOW: "Next: look at what is named above, then check again.",
+    Light.RED: "Next: put right what is named above and check again. Nobody puts a camera back to "
+    "a hundredth of a millimetre by hand: where one moved, calibrate anew and check against that.",
+}
+
 
 def number(value: float, digits: int = 3) -> str:
     """A number with so many significant digits, thousands apart, a dash for none."""
@@ -78,6 +85,7 @@ def check_page(record: CheckRecord, reference: Calibration | None = None, histor
         *([f'<p><a href="{esc(history)}">All checks over time</a></p>'] if history else []),
         *(finding(f.sentence, COLOURS[f.light]) for f in result.findings),
         *(f'<p class="note">{esc(note)}</p>' for note in result.notes),
+        f"<p>{esc(NEXT[result.light])}</p>",
         "<h2>Cameras</h2>",
         _camera_table(result.cameras),
         f'<p class="note">Test: the pose test over its limit, an alarm above 1 unless a finding '

@@ -48,7 +48,7 @@ def verdict(design: Design, layout: Layout) -> str:
     else:
         word = f"All {len(rows)} limits hold."
         names = sorted({family_words(row.family)[0] for row in binding})
-        more = f"What shapes the design: {', '.join(names)}." if names else "No limit binds."
+        more = f"What shapes the design: {'; '.join(names)}." if names else "No limit binds."
     if layout.collisions:
         more += f" The layout check lists {len(layout.collisions)} collisions: see Mounts."
     css = "verdict broken" if broken or layout.collisions else "verdict"

@@ -160,7 +160,7 @@ class CaptureRun:
                 self._known_s = time.monotonic()
                 self.progress(Progress("waiting for pictures", 0.4))
                 patience_s = self._last_deadline_s() + BOX_MARGIN_S + _overrun_s(threads)
-                collected, problems = outcomes(jobs, patience_s, self.cancel.is_set)
+                collected, problems = outcomes(jobs, patience_s, self._looking(jobs))
         finally:
             # The camera threads must not go on waiting for pictures that nobody will take.
             self._give_up.set()
@@ -172,6 +172,21 @@ class CaptureRun:
         return Firing(
             self.order, request, report, fired, wall, threads, ready, collected, absent, faults
         )
+
+    def _looking(self, jobs: Mapping[str, Future[Collected]]) -> Callable[[], bool]:
+        """Whether the waiting is to stop; tells meanwhile how many cameras are done."""
+        told = 0
+
+        def look() -> bool:
+            nonlocal told
+            done = sum(job.done() for job in jobs.values())
+            if done > told:
+                told = done
+                share = done / max(len(jobs), 1)
+                self.progress(Progress("waiting for pictures", 0.4 + 0.3 * share))
+            return self.cancel.is_set()
+
+        return look
 
     def _want(
         self, thread: CameraThread, ready: Mapping[str, Ready], start: threading.Event

@@ -88,6 +88,13 @@ def check(
             measurement_tables.print_check(result)
             print_files(files_of(out))
     if result.light == "red":
+        if not as_json:
+            say_next(
+                f"see {out / 'report.html'}, put right what is named there and check again, or "
+                "calibrate anew",
+                *("calibrate", "NEW-PICTURES", "--targets", inputs["targets"]),
+                *("--out", "new-calibration"),
+            )
         raise typer.Exit(NOT_WELL)
     if not as_json:
         say_next(

@@ -55,6 +55,16 @@ def test_a_capture_is_complete_synchronised_and_filed(bench: BenchMaker) -> None
     assert {"arming cameras", "firing", "writing"} <= {step.stage for step in seen}
 
 
+def test_while_one_is_waited_for_the_cameras_that_are_done_are_told(bench: BenchMaker) -> None:
+    station = with_policy(memory_station(), frame_deadline_s=0.5)
+    made = bench(station, {"cam01": CameraScript(miss=frozenset({1}))})
+    seen: list[Progress] = []
+    made.rig.capture(made.session, "smile", progress=seen.append)
+    waiting = {s.fraction for s in seen if s.stage == "waiting for pictures"}
+    # Two cameras of three, of the way from 0.4 to 0.7.
+    assert any(fraction == pytest.approx(0.6) for fraction in waiting)
+
+
 def test_a_burst_pairs_every_shot(bench: BenchMaker) -> None:
     made = bench()
     record = made.rig.capture(made.session, "burst", shots=4, interval_us=25_000.0).record
