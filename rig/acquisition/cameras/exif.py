@@ -21,6 +21,10 @@ TAGS = {
 """Our name of a tag, then where files keep it."""
 
 
+TIME_TAGS = ("DateTimeOriginal", "SubSecTimeOriginal", "OffsetTimeOriginal")
+"""Those of :data:`TAGS` that say when."""
+
+
 def read_exif(path: Path) -> Mapping[str, str]:
     """The tags of :data:`TAGS` that the file has, as text; empty when it has none.
 

@@ -6,15 +6,11 @@ and it has all that its header promises.
 
 from __future__ import annotations
 
-import hashlib
-import threading
 import time
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
-from stat import S_ISREG
 from typing import Annotated, Literal
 
 from pydantic import Field
@@ -33,12 +29,16 @@ from rig.acquisition.cameras.base import (
     TimestampKind,
     TriggerKind,
 )
-from rig.acquisition.cameras.exif import exposure_us, read_exif
+from rig.acquisition.cameras.exif import TIME_TAGS, exposure_us
+from rig.acquisition.cameras.folderwatch import FolderWatch, Stamp
 from rig.acquisition.cameras.options import read_options
 from rig.acquisition.cameras.reach import FolderReach, answered
-from rig.acquisition.cameras.wholeness import MEDIA_TYPES, is_whole
+from rig.acquisition.cameras.wholeness import MEDIA_TYPES
+from rig.acquisition.imaging import same_pixels
 
 POLL_S = 0.03
+LONGEST_DOUBT_S = 3.0
+"""How long a file with empty sectors must not have changed; less where the deadline is shorter."""
 
 
 class FolderOptions(StrictModel):
@@ -81,89 +81,6 @@ def _require_different(options: FolderOptions) -> None:
             )
 
 
-@dataclass(frozen=True)
-class Stamp:
-    """What changes when a file is written to, and what stays when it is renamed."""
-
-    size: int
-    modified_ns: int
-    node: tuple[int, int] = (0, 0)
-
-
-class FolderWatch:
-    """The files below a folder, looked at by name and time; remembers what it read of them."""
-
-    def __init__(self, root: Path, suffixes: Sequence[str]) -> None:
-        self.root = root
-        self._suffixes = tuple(s.lower() for s in suffixes) or tuple(MEDIA_TYPES)
-        self._whole: dict[tuple[Path, Stamp], bool] = {}
-        self._tags: dict[tuple[Path, Stamp], Mapping[str, str]] = {}
-        self._contents: dict[tuple[Path, Stamp], str] = {}
-        self._seen: dict[str, str] = {}
-        self._lock = threading.Lock()
-
-    def content(self, path: Path, stamp: Stamp) -> str:
-        """The checksum of a file's bytes."""
-        with self._lock:
-            if (path, stamp) not in self._contents:
-                self._contents[path, stamp] = hashlib.sha256(path.read_bytes()).hexdigest()
-            return self._contents[path, stamp]
-
-    def seen(self, content: str) -> str:
-        """The file that had this content in an earlier shot, empty when none did."""
-        with self._lock:
-            return self._seen.get(content, "")
-
-    def see(self, contents: Mapping[str, str]) -> None:
-        """Remember contents, and the names of their files, as those of earlier shots."""
-        with self._lock:
-            for content, name in contents.items():
-                self._seen.setdefault(content, name)
-
-    def files(self, below: Path) -> dict[Path, Stamp]:
-        """Picture files and their stamps. OSError when the folder is not there."""
-        below.stat()
-        found = {}
-        for path in below.rglob("*"):
-            if path.suffix.lower() not in self._suffixes or path.name.startswith("."):
-                continue
-            try:
-                stat = path.stat()
-            except OSError:  # renamed or removed by its program just now
-                continue
-            if not S_ISREG(stat.st_mode):
-                # Reading a pipe or a socket waits for ever.
-                continue
-            found[path] = Stamp(stat.st_size, stat.st_mtime_ns, (stat.st_dev, stat.st_ino))
-        return found
-
-    def unfinished(self, below: Path) -> dict[tuple[int, int], str]:
-        """Files of other names, by what stays when they are renamed: pictures that are to be."""
-        found = {}
-        for path in below.rglob("*"):
-            if path.suffix.lower() not in self._suffixes or path.name.startswith("."):
-                with suppress(OSError):
-                    stat = path.lstat()
-                    if S_ISREG(stat.st_mode):
-                        found[stat.st_dev, stat.st_ino] = path.name
-        return found
-
-    def whole(self, path: Path, stamp: Stamp) -> bool:
-        """Whether the file is all there; what is not is looked at again."""
-        with self._lock:
-            if self._whole.get((path, stamp)):
-                return True
-            self._whole[path, stamp] = is_whole(path)
-            return self._whole[path, stamp]
-
-    def tags(self, path: Path, stamp: Stamp) -> Mapping[str, str]:
-        """The EXIF of a whole file."""
-        with self._lock:
-            if (path, stamp) not in self._tags:
-                self._tags[path, stamp] = read_exif(path)
-            return self._tags[path, stamp]
-
-
 class FolderCamera:
     """One camera whose files arrive in a folder; a :class:`CameraDevice`."""
 
@@ -178,9 +95,12 @@ class FolderCamera:
         self._nodes: dict[Path, tuple[int, int]] = {}
         self._unfinished_then: dict[tuple[int, int], str] = {}
         self._settling: dict[Path, tuple[Stamp, float]] = {}
+        self._doubted: set[str] = set()
         self._frames: list[Frame] = []
         self._armed = False
         self._closed = False
+        self._tells_time = False
+        self._spec = ArmSpec("", 1, 0.0)
         self._counts: Counter[str] = Counter()
         self._known = self._look()
 
@@ -226,7 +146,7 @@ class FolderCamera:
             "see that the folder is there and can be read, then arm again",
         )
 
-    def arm(self, spec: ArmSpec) -> None:  # noqa: ARG002  the folder needs no preparation
+    def arm(self, spec: ArmSpec) -> None:
         """Remember what is there already; only what comes from now on counts."""
         if self._closed:
             raise self._gone()
@@ -238,10 +158,25 @@ class FolderCamera:
             for path, stamp in present.items()
             if stamp is not None and self._is_mine(path, stamp)
         )
+        self._tells_time = self._told_time(present)
+        self._spec = spec
         self._known, self._frames, self._armed = present, [], True
         self._before = dict(present)
         self._unfinished_then = self._watch.unfinished(self._below)
         self._settling.clear()
+        self._doubted.clear()
+
+    def _told_time(self, present: Mapping[Path, Stamp | None]) -> bool:
+        """Whether the pictures of before tell their times: those taken, else the newest there."""
+        if self._frames:
+            return any("DateTimeOriginal" in frame.metadata for frame in self._frames)
+        if self._tells_time:
+            return True
+        mine = [(s, p) for p, s in present.items() if s is not None and self._is_mine(p, s)]
+        stamp, path = max(mine, key=lambda one: one[0].modified_ns, default=(None, None))
+        if stamp is None or path is None:
+            return False
+        return "DateTimeOriginal" in self._watch.tags(path, stamp)
 
     def _is_new(self, path: Path, stamp: Stamp) -> bool:
         # A file that was half there when the camera was armed is of an earlier shot, however
@@ -290,34 +225,64 @@ class FolderCamera:
             if seen != stamp:
                 self._settling[path] = (stamp, now)
                 since = now
-            if now - since >= self._options.settle_s and self._watch.whole(path, stamp):
+            if self._is_steady(path, stamp, now - since):
                 self._known[path] = stamp
                 if self._is_mine(path, stamp):
                     self._take(path, stamp)
 
+    def _is_steady(self, path: Path, stamp: Stamp, unchanged_s: float) -> bool:
+        """Whether a file is all there; one that may yet be filled is given longer."""
+        if unchanged_s < self._options.settle_s or not self._watch.whole(path, stamp):
+            return False
+        if not self._watch.gaps(path, stamp):
+            return True
+        self._doubted.add(str(path))
+        return unchanged_s >= min(LONGEST_DOUBT_S, self._spec.deadline_s / 2.0)
+
     def _take(self, path: Path, stamp: Stamp) -> None:
+        frame = self._frame(path, stamp)
+        for k, former in enumerate(self._frames):
+            if former.metadata["path"] == str(path) and self._written_into(former, frame):
+                self._frames[k] = replace(frame, arrived_host_ns=former.arrived_host_ns)
+                return
+        self._frames.append(frame)
+        self._counts["frames"] += 1
+
+    def _written_into(self, former: Frame, now: Frame) -> bool:
+        """Whether a file that has changed is still the same picture, and not the next by its name.
+
+        Programs add ratings, rights and rotations to files that have come.
+        """
+        if former.metadata["path"] in self._doubted:
+            return True
+        times = [[f.metadata.get(t) for t in TIME_TAGS] for f in (former, now)]
+        if self._spec.shots == 1 and times[0][0] is not None:
+            return times[0] == times[1]
+        return times[0] == times[1] and same_pixels(former.encoded or b"", now.encoded or b"")
+
+    def _frame(self, path: Path, stamp: Stamp) -> Frame:
         tags = self._watch.tags(path, stamp)
         content = self._watch.content(path, stamp)
         known_as = self._renamed(path, stamp) or self._watch.seen(content)
         known_as = known_as or self._copied(path, stamp, content)
-        self._frames.append(
-            Frame(
-                camera_id=self._info.id,
-                arrived_host_ns=time.monotonic_ns(),
-                status=FrameStatus.OK,
-                encoded=path.read_bytes(),
-                media_type=MEDIA_TYPES[path.suffix.lower()],
-                exposure_us=exposure_us(tags),
-                metadata={
-                    **tags,
-                    "file": path.name,
-                    "path": str(path),
-                    "sha256": content,
-                    **({"known_as": known_as} if known_as else {}),
-                },
-            )
+        doubts = {"known_as": known_as} if known_as else {}
+        if self._tells_time and "DateTimeOriginal" not in tags:
+            doubts["unlikely"] = "it tells no time"
+        return Frame(
+            camera_id=self._info.id,
+            arrived_host_ns=time.monotonic_ns(),
+            status=FrameStatus.OK,
+            encoded=path.read_bytes(),
+            media_type=MEDIA_TYPES[path.suffix.lower()],
+            exposure_us=exposure_us(tags),
+            metadata={
+                **tags,
+                "file": path.name,
+                "path": str(path),
+                "sha256": content,
+                **doubts,
+            },
         )
-        self._counts["frames"] += 1
 
     def _renamed(self, path: Path, stamp: Stamp) -> str:
         """The name a file had when the camera was armed, empty for one that was not there."""

@@ -32,6 +32,8 @@ _PARTS = ((273, 279), (324, 325), (513, 514))
 """Tags of where parts of the picture lie, and of how long they are: strips, tiles, JPEG."""
 _SUB_IFDS = (330, 34665)
 _MAX_IFDS = 64
+SECTOR = 512
+_PIECE = 1 << 20
 _MAX_VALUES = 1 << 20
 
 
@@ -57,6 +59,35 @@ def is_whole(path: Path) -> bool:
             return _tiff(file, size)
     except (OSError, struct.error, ValueError):
         return False
+
+
+def has_gaps(path: Path) -> bool:
+    """Whether a whole sector of the picture is zeros: room that was made and is not yet filled.
+
+    Programs that copy set a file's size first, and its header may come before its picture. True
+    too for pictures that are truly black, where nothing compresses them. OSError when it is gone.
+    """
+    with path.open("rb") as file:
+        size = path.stat().st_size
+        try:
+            parts = _tiff_parts(file, size) or [(0, size)]
+        except (struct.error, ValueError):
+            parts = [(0, size)]
+        return any(_empty_sector(file, begin, end) for begin, end in parts)
+
+
+def _empty_sector(file: BinaryIO, begin: int, end: int) -> bool:
+    place = -(-begin // SECTOR) * SECTOR
+    file.seek(place)
+    while place + SECTOR <= end:
+        piece = file.read(min(_PIECE, end - place))
+        for start in range(0, len(piece) - SECTOR + 1, SECTOR):
+            if piece[start] == 0 and not any(piece[start : start + SECTOR]):
+                return True
+        if not piece:
+            break
+        place += len(piece)
+    return False
 
 
 def _read(file: BinaryIO, form: str) -> tuple[int, ...]:
@@ -124,25 +155,31 @@ def _boxes(file: BinaryIO, size: int) -> bool:
 
 
 def _tiff(file: BinaryIO, size: int) -> bool:
+    parts = _tiff_parts(file, size)
+    return bool(parts) and all(begin <= end <= size for begin, end in parts)
+
+
+def _tiff_parts(file: BinaryIO, size: int) -> list[tuple[int, int]]:
+    """Where the parts of the picture lie, begin and end; none for what is no such file.
+
+    ValueError and struct.error where a directory is not there.
+    """
     order = _TIFF_MAGIC.get(file.read(4))
     if order is None:
-        return False
+        return []
     (first,) = _read(file, order + "I")
-    todo, seen, parts = [first], set[int](), 0
+    todo, seen, parts = [first], set[int](), list[tuple[int, int]]()
     while todo:
         place = todo.pop()
         if place == 0 or place in seen:
             continue
         seen.add(place)
         if len(seen) > _MAX_IFDS or place + 2 > size:
-            return False
+            raise ValueError("a directory lies beyond the end")
         tags, following = _ifd(file, order, place, size)
         todo += [following, *(offset for tag in _SUB_IFDS for offset in tags.get(tag, ()))]
-        for begin, end in _extents(tags):
-            parts += 1
-            if end > size or begin > end:
-                return False
-    return parts > 0
+        parts += _extents(tags)
+    return parts
 
 
 def _ifd(file: BinaryIO, order: str, place: int, size: int) -> tuple[dict[int, list[int]], int]:

@@ -169,13 +169,15 @@ class Collector:
 def wanted(frames: Sequence[Frame], want: Want, start_ns: int) -> int:
     """How many of the pictures can be of this capture's shots.
 
-    Copies count once, and what was there or exposed before FIRE not at all: else the wait would
+    Copies count once, and what was there or exposed before FIRE, or what the camera doubts, not at
+    all: else the wait would
     end before the last true picture has come. Where each shot makes files of several kinds, the
     kind counts of which there are fewest; where it is not said which, that of which there are most.
     """
     seen: dict[str, set[tuple[int | None, ...]]] = {kind: set() for kind in want.kinds}
     for k, frame in enumerate(frames):
         stale = frame.arrived_host_ns < start_ns
+        stale |= not frame.metadata.keys().isdisjoint(("known_as", "unlikely"))
         if want.ready_stamp is not None and frame.device_ns is not None:
             stale |= frame.device_ns < want.ready_stamp
         if not stale:

@@ -7,6 +7,7 @@ from them. Numbers that are not known are null. Instants of the host's monotonic
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import PurePosixPath
 from typing import Annotated, Any, Literal
 
@@ -231,6 +232,8 @@ def contradictions(record: CaptureRecord) -> list[str]:
         for name, shot in sorted(wanted - have - lost)
     ]
     found += [f"a picture of {name} is of no camera or shot" for name, _ in sorted(have - wanted)]
+    files = Counter(frame.file.path for frame in record.frames)
+    found += [f"{path} is {n} pictures at once" for path, n in sorted(files.items()) if n > 1]
     return found
 
 

@@ -8,19 +8,20 @@ shown to belong is held back and named: it stays where its program put it.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from datetime import datetime
-from pathlib import PurePath
 
 from rig.acquisition.cameras.base import Frame
 from rig.acquisition.synchrony.cameraframes import Method, Pair, Pairing
 from rig.acquisition.synchrony.faults import Fault, FaultKind
+from rig.acquisition.synchrony.fileexposures import (
+    SECOND_NS,
+    FileExposure,
+    Span,
+    file_exposures,
+)
 from rig.acquisition.synchrony.filenumbers import FileNumbers, file_number
-from rig.acquisition.synchrony.imagechecks import is_raw
 
-SECOND_NS = 1_000_000_000
 SLACK_NS = SECOND_NS // 2
 """How far the time in a file may be from the start of its exposure beyond its last digit."""
 NEAR_NS = 3 * SECOND_NS // 2
@@ -28,53 +29,12 @@ NEAR_NS = 3 * SECOND_NS // 2
 ZONE_NS = 1800 * SECOND_NS
 WIDEST_ZONE_NS = 14 * 3600 * SECOND_NS
 """A clock that was set to another time zone, or to summer time, is off by whole half hours."""
+RIVALS_NS = 2 * 24 * 3600 * SECOND_NS
+"""Of two pictures farther apart, only one can be of a clock that was set, in whatever zone."""
 DRIFT = 1e-4
 """A camera's clock gains or loses at most this share of the time since it was last compared."""
 REMEMBERED = 500
 """Shots against which a late picture is held."""
-
-
-@dataclass(frozen=True)
-class Span:
-    """An interval of nanoseconds, both ends included."""
-
-    low_ns: int
-    high_ns: int
-
-    def shifted(self, by_ns: int) -> Span:
-        """The same, later by so much."""
-        return Span(self.low_ns + by_ns, self.high_ns + by_ns)
-
-    def wider(self, below_ns: int, above_ns: int) -> Span:
-        """The same with both ends moved out."""
-        return Span(self.low_ns - below_ns, self.high_ns + above_ns)
-
-    def common(self, other: Span) -> Span | None:
-        """What two intervals have in common."""
-        low, high = max(self.low_ns, other.low_ns), min(self.high_ns, other.high_ns)
-        return Span(low, high) if low <= high else None
-
-
-def file_time(tags: Mapping[str, str]) -> Span | None:
-    """When a file says its picture was taken, in ns since 1970 by its camera's clock.
-
-    Times without a zone are taken to be of the computer's. As wide as the last digit; None where
-    the file does not say.
-    """
-    try:
-        at = datetime.strptime(tags.get("DateTimeOriginal", ""), "%Y:%m:%d %H:%M:%S")
-        zone = tags.get("OffsetTimeOriginal", "").strip()
-        if re.fullmatch(r"[+-]\d\d:\d\d", zone):
-            at = at.replace(tzinfo=datetime.strptime(zone, "%z").tzinfo)
-        seconds = round(at.astimezone().timestamp())
-    except (ValueError, OverflowError, OSError):
-        return None
-    digits = tags.get("SubSecTimeOriginal", "").strip()
-    if not re.fullmatch(r"\d{1,9}", digits):
-        return Span(seconds * SECOND_NS, (seconds + 1) * SECOND_NS)
-    step = SECOND_NS // 10 ** len(digits)
-    low = seconds * SECOND_NS + int(digits) * step
-    return Span(low, low + step)
 
 
 @dataclass(frozen=True)
@@ -84,19 +44,6 @@ class FiredShot:
     capture_id: str
     shot: int
     at_ns: int
-
-
-@dataclass(frozen=True, eq=False)
-class FileExposure:
-    """The files of one exposure: those of one name without its ending."""
-
-    frames: tuple[Frame, ...]
-    time: Span | None
-
-    @property
-    def name(self) -> str:
-        """The file by which it is named."""
-        return self.frames[0].metadata.get("file", "a file")
 
 
 @dataclass(frozen=True)
@@ -115,6 +62,8 @@ class CameraFiles:
     known_at_ns: int = 0
     clues: list[Clue] = field(default_factory=list)
     outstanding: int = 0
+    tells_now: bool = False
+    """Whether files of the capture that is being sorted tell their times."""
     serial: str = ""
     numbers: FileNumbers = field(default_factory=FileNumbers)
 
@@ -159,9 +108,13 @@ class FileEvidence:
     ) -> tuple[Pairing, Pairing | None]:
         memory, faults = self._of(given.camera), list[Fault]()
         frames = _own(given, memory, owners, faults)
-        exposures = _exposures(frames)
+        exposures, spare = file_exposures(frames, len(given.shots))
+        for frame in spare:
+            why = "a larger file of the same exposure is kept"
+            _hold(given, FileExposure((frame,), None), why, faults)
         found: dict[int, tuple[FileExposure, Method]] = {}
-        lone = len(exposures) <= len(given.shots)
+        lone = sum(_of_these_days(given, e) for e in exposures) <= len(given.shots)
+        memory.tells_now = any(e.time is not None for e in exposures)
         fits = [(e, self._fits(given, memory, e, lone, faults)) for e in exposures]
         usable = [(e, shots) for e, shots in fits if shots]
         if len(usable) == len(given.shots) and _in_order(given, usable):
@@ -186,6 +139,10 @@ class FileEvidence:
         faults: list[Fault],
     ) -> list[FiredShot]:
         """The shots of this capture that a file may be of; none when it is held back."""
+        if exposure.time is None and (memory.offset is not None or memory.tells_now):
+            why = "it tells no time, and its camera's pictures do: a thumbnail, or another's file"
+            _hold(given, exposure, f"{why}; begin a new session if they no longer do", faults)
+            return []
         if exposure.time is None:
             return _untimed(given, memory, exposure, faults)
         if memory.offset is None:
@@ -218,7 +175,8 @@ class FileEvidence:
     ) -> list[FiredShot]:
         """The same for a camera whose clock's offset is not known, or not the one it was.
 
-        ``lone``: no more exposures came than were asked for, so that each may be its shot's.
+        ``lone``: no more exposures of these days came than were asked for, so that each may be
+        its shot's.
         """
         offsets = {shot: _offset(at, shot, given.wait_ns) for shot in given.shots}
         agreed = [s for s, offset in offsets.items() if self._agrees(memory, s, offset)]
@@ -299,6 +257,13 @@ def _is_plain(offset: Span) -> bool:
     half = (offset.high_ns - offset.low_ns) // 2
     away = abs((middle + ZONE_NS // 2) % ZONE_NS - ZONE_NS // 2)
     return abs(middle) <= WIDEST_ZONE_NS + half and away <= max(NEAR_NS, half)
+
+
+def _of_these_days(given: FileDelivery, exposure: FileExposure) -> bool:
+    """Whether a clock could be so far off that the picture is of about now."""
+    if exposure.time is None:
+        return False
+    return any(abs(exposure.time.low_ns - shot.at_ns) < RIVALS_NS for shot in given.shots)
 
 
 def _untimed(
@@ -390,25 +355,6 @@ def _own(
         else:
             own[content] = frame
     return list(own.values())
-
-
-def _exposures(frames: Sequence[Frame]) -> list[FileExposure]:
-    """Files by exposure, in order of their times, numbers and arrival."""
-    groups: dict[str, list[Frame]] = {}
-    for number, frame in enumerate(frames):
-        stem = PurePath(frame.metadata.get("file", str(number))).stem.casefold()
-        groups.setdefault(stem, []).append(frame)
-    exposures = []
-    for group in groups.values():
-        ordered = tuple(sorted(group, key=is_raw))
-        times = [at for frame in ordered if (at := file_time(frame.metadata)) is not None]
-        exposures.append(FileExposure(ordered, times[0] if times else None))
-
-    def order(e: FileExposure) -> tuple[int, int, int]:
-        at = 0 if e.time is None else e.time.low_ns
-        return at, int(file_number(e.name) or 0), e.frames[0].arrived_host_ns
-
-    return sorted(exposures, key=order)
 
 
 def _pairings(

@@ -3,11 +3,14 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Iterator
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from camera_rigs import jpeg
+from PIL import Image
 from trigger_boxes import wait_until
 
 from common.errors import DeviceError, InputError, NotFoundError
@@ -56,6 +59,30 @@ def test_a_file_written_drop_by_drop_comes_whole(tmp_path: Path) -> None:
     (frame,) = camera.wait_frames(1, 5.0)
     writer.join()
     assert frame.encoded == data
+
+
+def test_a_file_whose_room_was_made_first_is_waited_for(tmp_path: Path) -> None:
+    (tmp_path / "left").mkdir()
+    camera = folder(tmp_path).open("left")
+    camera.arm(SHOT)
+    noise = np.random.default_rng(0).integers(1, 250, (90, 120, 3), np.uint8)
+    made = BytesIO()
+    Image.fromarray(noise).save(made, "TIFF")
+    data, path = made.getvalue(), tmp_path / "left" / "a.tif"
+    # Header, beginning and end are there: nothing that the header promises lies beyond the end.
+    path.write_bytes(data[:9000] + bytes(len(data) - 12000) + data[-3000:])
+    assert camera.wait_frames(1, 5 * SETTLE_S) == ()
+    path.write_bytes(data)
+    (frame,) = camera.wait_frames(1, 2.0)
+    assert frame.encoded == data
+
+
+def test_a_picture_that_is_truly_black_somewhere_comes_in_time(tmp_path: Path) -> None:
+    (tmp_path / "left").mkdir()
+    camera = folder(tmp_path).open("left")
+    camera.arm(ArmSpec("a", 1, 1.0))
+    Image.new("RGB", (120, 90)).save(tmp_path / "left" / "a.tif")
+    assert len(camera.wait_frames(1, 1.0)) == 1
 
 
 def test_a_file_half_there_when_armed_is_of_before(tmp_path: Path) -> None:

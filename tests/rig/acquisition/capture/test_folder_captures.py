@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import shutil
 import threading
@@ -22,15 +23,17 @@ from common.errors import ConflictError, InputError
 from rig.acquisition.capture.rig import Rig
 from rig.acquisition.session.folder import Session
 from rig.acquisition.session.records import CaptureRecord
+from rig.acquisition.session.verify import verify_session
 from rig.acquisition.station.spec import CameraPlan, Station
 from rig.devices.station import open_station
 
 CAMERAS = ("cam01", "cam02", "cam03")
 
 
-def jpeg(at: datetime | None, seed: int, serial: str = "") -> bytes:
+def jpeg(at: datetime | None, seed: int, serial: str = "", scale: int = 1) -> bytes:
     """A picture taken at ``at`` by its camera's clock; the seed is what it shows."""
-    noise = np.random.default_rng(seed).integers(60, 250, (24, 32, 3), np.uint8)
+    size = (24 * scale, 32 * scale, 3)
+    noise = np.random.default_rng(seed).integers(60, 250, size, np.uint8)
     exif = Image.Exif()
     details = exif.get_ifd(IFD.Exif)
     if at is not None:
@@ -213,6 +216,58 @@ def test_a_raw_file_that_comes_later_joins_its_shot_or_is_told(tmp_path: Path) -
         lacking = made.capture("two", made.sound(2))
         assert {fault.kind for fault in lacking.faults} == {"file-missing"}
         assert lacking.state == "partial" and not lacking.missing
+
+
+def test_of_two_files_of_one_exposure_none_is_written_over_the_other(tethered: Tethered) -> None:
+    small, large = [], []
+
+    def deliver(fired: datetime) -> None:
+        for name in CAMERAS:
+            for slot, scale, kept in (("slot1", 4, large), ("slot2", 1, small)):
+                (tethered.root / name / slot).mkdir()
+                kept.append(jpeg(fired, 7, scale=scale) + name.encode())
+                (tethered.root / name / slot / "DSC_0001.JPG").write_bytes(kept[-1])
+
+    record = tethered.capture("one", deliver)
+    assert record.state == "complete"
+    assert len({frame.file.path for frame in record.frames}) == len(record.frames) == 3
+    filed = {frame.metadata["sha256"] for frame in record.frames}
+    assert filed == {hashlib.sha256(data).hexdigest() for data in large}
+    assert held(record).count("a larger file of the same exposure is kept") == 3
+    assert verify_session(tethered.session.folder).whole
+
+
+def test_a_file_that_is_written_into_after_it_came_is_filed_once(tethered: Tethered) -> None:
+    def deliver(fired: datetime) -> None:
+        tethered.sound(1)(fired)
+        # Taken after 0.05 s, and looked for more of its kind until 0.2 s.
+        time.sleep(0.12)
+        path = tethered.root / CAMERAS[-1] / "DSC_0001.JPG"
+        picture = Image.open(BytesIO(path.read_bytes()))
+        exif = picture.getexif()
+        exif[Base.Copyright] = "the laboratory"
+        picture.save(path, "JPEG", exif=exif)
+
+    record = tethered.capture("one", deliver)
+    assert record.state == "complete"
+    assert len(record.frames) == 3 and not record.faults
+
+
+def test_thumbnails_are_no_pictures(tethered: Tethered) -> None:
+    tethered.capture("one", tethered.sound(1))
+
+    def deliver(fired: datetime) -> None:
+        for place in ("@eaDir/DSC_0001.JPG/XL.jpg", ".thumbnails/large/x.jpg", "small.jpg"):
+            path = tethered.root / "cam01" / place
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(jpeg(None, len(place)))
+        time.sleep(0.4)
+        tethered.sound(2)(fired)
+
+    record = tethered.capture("two", deliver)
+    assert record.state == "complete"
+    assert {frame.metadata["file"] for frame in record.frames} == {"DSC_0002.JPG"}
+    assert "cam01: small.jpg is held back: it tells no time" in held(record)
 
 
 def test_locks_go_by_folder_and_not_by_name(tmp_path: Path) -> None:

@@ -16,9 +16,8 @@ from rig.acquisition.synchrony.fileevidence import (
     FileDelivery,
     FileEvidence,
     FiredShot,
-    Span,
-    file_time,
 )
+from rig.acquisition.synchrony.fileexposures import Span, file_time
 
 SECOND = 1_000_000_000
 NOON = datetime(2026, 11, 29, 12, tzinfo=UTC)
@@ -199,6 +198,38 @@ def test_raw_files_come_beside_their_pictures_and_what_lacks_is_told() -> None:
         "cam"
     ]
     assert [fault.kind for fault in lone.faults] == [FaultKind.FILE_MISSING]
+
+
+def test_a_raw_file_of_another_time_is_of_another_shot() -> None:
+    kinds = frozenset({"image/jpeg", "image/x-nikon-nef"})
+    jpg = picture("capt0000.jpg", NOON, "a")
+    for when in (NOON - timedelta(days=365, seconds=77), NOON - timedelta(days=3)):
+        nef = picture("capt0000.nef", when, "b", kind="image/x-nikon-nef")
+        given = FileDelivery("cam", (nef, jpg), shots(1, NOON), 0, kinds=kinds)
+        pairing, raws = FileEvidence().sort([given])["cam"]
+        assert [one.frame.media_type for one in pairing.pairs] == ["image/jpeg"]
+        assert raws is None
+        assert "capt0000.nef is held back" in held(pairing)
+        assert FaultKind.FILE_MISSING in {fault.kind for fault in pairing.faults}
+
+
+def test_a_raw_file_of_another_body_is_of_another_shot() -> None:
+    jpg, nef = picture("1.jpg", NOON, "a"), picture("1.nef", NOON, "b", kind="image/x-nikon-nef")
+    theirs = Frame(**{**vars(nef), "metadata": {**nef.metadata, "BodySerialNumber": "2"}})
+    ours = Frame(**{**vars(jpg), "metadata": {**jpg.metadata, "BodySerialNumber": "1"}})
+    given = FileDelivery("cam", (ours, theirs), shots(1, NOON), 0)
+    pairing, raws = FileEvidence().sort([given])["cam"]
+    assert raws is None and held(pairing)
+
+
+def test_a_file_without_a_time_is_no_picture_of_a_camera_that_tells_times() -> None:
+    evidence, later = FileEvidence(), NOON + timedelta(seconds=30)
+    preview, own = picture("preview.jpg", None, "p"), picture("1.jpg", NOON, "a")
+    first = sorted_one(evidence, 1, NOON, preview, own)
+    assert [one.frame.metadata["truth"] for one in first.pairs] == ["a"]
+    second = sorted_one(evidence, 2, later, picture("preview 2.jpg", None, "q"))
+    assert not second.pairs
+    assert "it tells no time, and its camera's pictures do" in held(second)
 
 
 def test_a_burst_is_sorted_by_time_and_not_by_arrival() -> None:
