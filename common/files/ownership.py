@@ -14,6 +14,9 @@ import stat
 from collections.abc import Collection, Iterator
 from pathlib import Path
 
+from common.errors import ConflictError
+from common.files.writing import put_whole
+
 MARKER = ".rigwright.json"
 """The name of the list."""
 
@@ -27,11 +30,40 @@ def files_of(folder: Path) -> dict[str, Path]:
 
 
 def mark(folder: Path, but: Collection[Path] = ()) -> None:
-    """Write the list of all files that are in ``folder`` now, ``but`` those of somebody else."""
-    files = {name: _sha256(path) for name, path in files_of(folder).items() if path not in but}
+    """Write the list of all files that are in ``folder`` now, ``but`` those of somebody else.
+
+    Raises :class:`ConflictError` where something else stands in the place of the list, and
+    :class:`OSError`.
+    """
+    _write_list(folder, {name: _sha256(p) for name, p in files_of(folder).items() if p not in but})
+
+
+def mark_also(folder: Path, path: Path) -> None:
+    """Put one more file in ``folder`` on its list, which is begun where there is none.
+
+    Raises as :func:`mark` does.
+    """
+    name = path.relative_to(folder).as_posix()
+    _write_list(folder, (_listed(folder) or {}) | {name: _sha256(path)})
+
+
+def refuse_other_list(folder: Path) -> None:
+    """Raise :class:`ConflictError` where what stands in the place of the list is no such list."""
+    marker = folder / MARKER
+    if os.path.lexists(marker) and _listed(folder) is None:
+        raise ConflictError(
+            "list-not-ours",
+            f"{marker} was not written by this program, or is damaged",
+            "move it away, or give another folder",
+        )
+
+
+def _write_list(folder: Path, files: dict[str, str]) -> None:
+    refuse_other_list(folder)
     document = {"schema": SCHEMA, "sha256": files}
     text = json.dumps(document, indent=1, ensure_ascii=False) + "\n"
-    (folder / MARKER).write_text(text, encoding="utf-8")
+    marker = folder / MARKER
+    put_whole(marker, text.encode(), overwrite=marker.exists())
 
 
 def foreign(folder: Path, but: Collection[Path] = ()) -> str | None:
@@ -69,7 +101,8 @@ def _listed(folder: Path) -> dict[str, str] | None:
     """The list; None where there is none, or one that is not whole."""
     marker = folder / MARKER
     try:
-        if marker.is_symlink():
+        # Reading a pipe would wait for somebody to write into it.
+        if not stat.S_ISREG(marker.lstat().st_mode):
             return None
         document = json.loads(marker.read_text(encoding="utf-8"))
         if document["schema"] != SCHEMA:

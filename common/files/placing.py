@@ -7,11 +7,11 @@ import errno
 import os
 import shutil
 from collections.abc import Callable
-from contextlib import suppress
 from pathlib import Path
 
 from common.errors import ConflictError, InputError
 from common.files.ownership import foreign
+from common.files.writing import give_owner
 
 NOT_REPLACED = "give another --out, or --force to replace results that are in it"
 
@@ -67,10 +67,7 @@ def _dress(new: Path, out: Path) -> None:
     if not out.is_dir():
         return
     standing = out.stat()
-    with suppress(PermissionError):
-        os.chown(new, -1, standing.st_gid)
-    with suppress(PermissionError):
-        os.chown(new, standing.st_uid, -1)
+    give_owner(new, standing)
     # After the owner: a change of owner takes the set-group bit away.
     shutil.copystat(out, new)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import secrets
+import shutil
 import stat
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
@@ -18,16 +19,27 @@ _NO_LINKS = (errno.EPERM, errno.EOPNOTSUPP, errno.ENOSYS, errno.EMLINK)
 
 
 def write_whole(path: Path, data: bytes, overwrite: bool = False, *, private: bool = False) -> None:
-    """Writes to a neighbour, then renames; what is replaced keeps its permissions.
+    """Writes to a neighbour, then renames; what is replaced keeps owner, permissions, attributes.
 
-    A link stays, and the file it leads to is replaced. Without ``overwrite`` nothing is replaced,
-    what appears meanwhile included. A ``private`` file is at no moment open to anybody but its
-    owner.
+    A link stays, and the file it leads to is replaced. Another hard link to it keeps what was in
+    it, as those who keep copies by such links want. Without ``overwrite`` nothing is replaced,
+    what appears meanwhile included, and with it nothing that is write-protected. A ``private``
+    file is at no moment open to anybody but its owner, who is that of its folder for a new one.
 
     Raises :class:`ConflictError` when the file is there, :class:`InputError` when it cannot be
     written.
     """
     place = writable_place(path, overwrite=overwrite)
+    try:
+        put_whole(place, data, overwrite=overwrite, private=private)
+    except FileExistsError:
+        raise _taken(path) from None
+    except OSError as error:
+        raise _unwritable(path, error) from error
+
+
+def put_whole(place: Path, data: bytes, *, overwrite: bool, private: bool = False) -> None:
+    """As :func:`write_whole`, over a :func:`writable_place`; raises :class:`OSError`."""
     part = neighbour(place)
     try:
         with open(part, "wb", opener=_private if private else None) as file:
@@ -35,26 +47,42 @@ def write_whole(path: Path, data: bytes, overwrite: bool = False, *, private: bo
             file.flush()
             # Renamed first and written later, a file would be empty after a loss of power.
             os.fsync(file.fileno())
+        _dress(part, place, private=private)
         if overwrite:
-            if place.exists() and not private:
-                part.chmod(place.stat().st_mode & 0o7777)
             part.replace(place)
         else:
             put_new(part, place)
-    except FileExistsError:
-        raise _taken(path) from None
-    except OSError as error:
-        raise _unwritable(path, error) from error
     finally:
         with suppress(OSError):
             part.unlink(missing_ok=True)
+
+
+def _dress(part: Path, place: Path, *, private: bool) -> None:
+    """Give ``part`` what the file at ``place`` has, as far as this process may."""
+    there = place.exists()
+    if there or private:
+        give_owner(part, (place if there else place.parent).stat())
+    if there and not private:
+        written = part.stat()
+        # After the owner: a change of owner takes bits away.
+        shutil.copystat(place, part)
+        os.utime(part, ns=(written.st_atime_ns, written.st_mtime_ns))
+
+
+def give_owner(path: Path, owned: os.stat_result) -> None:
+    """Give ``path`` the group and owner in ``owned``, each as far as this process may."""
+    with suppress(PermissionError):
+        os.chown(path, -1, owned.st_gid)
+    with suppress(PermissionError):
+        os.chown(path, owned.st_uid, -1)
 
 
 def writable_place(path: Path, *, overwrite: bool) -> Path:
     """Where a file written to ``path`` ends up: ``path`` itself, or where its link leads.
 
     Raises :class:`ConflictError` where something is there and ``overwrite`` is not asked for,
-    :class:`InputError` where that is no plain file, or the link leads to nothing.
+    :class:`InputError` where that is no plain file, is write-protected, or the link leads to
+    nothing.
     """
     if not os.path.lexists(path):
         return path
@@ -62,13 +90,18 @@ def writable_place(path: Path, *, overwrite: bool) -> Path:
         raise _taken(path)
     try:
         place = path.resolve(strict=True)
-        plain = stat.S_ISREG(place.stat().st_mode)
+        mode = place.stat().st_mode
     except (OSError, RuntimeError) as error:
         raise InputError(
             "file-write", f"{path} is a link that leads to no file", "mend it or remove it"
         ) from error
-    if not plain:
+    if not stat.S_ISREG(mode):
         raise InputError("file-write", f"{path} is no plain file", "give another name")
+    # An administrator may write whatever the permissions say; whoever took them away meant him too.
+    if not (mode & stat.S_IWUSR and os.access(place, os.W_OK, effective_ids=True)):
+        raise InputError(
+            "file-write", f"{path} is write-protected", "make it writable, or give another name"
+        )
     return place
 
 

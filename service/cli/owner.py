@@ -17,6 +17,7 @@ from typing import Protocol
 from urllib.parse import quote
 
 from common.errors import InputError, InternalError, NotFoundError, RigwrightError
+from common.files.writing import writable_place
 from common.progress import ProgressCallback
 from rig.acquisition.capture.rig import Rig
 from rig.acquisition.session.folder import Session, session_folder
@@ -203,8 +204,10 @@ class OwnRig:
                     cancel=cancel,
                 )
             )
-        measured = self._rig.sync_check(request.captures, progress=progress, cancel=cancel)
         path = self._rig.station.path
+        if request.adopt and path is not None:
+            writable_place(path, overwrite=True)
+        measured = self._rig.sync_check(request.captures, progress=progress, cancel=cancel)
         adopted = request.adopt and measured.timings is not None and path is not None
         if adopted and measured.timings is not None and path is not None:
             write_timings(path, measured.timings)

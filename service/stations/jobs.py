@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from common.files.plain import plain
+from common.files.writing import writable_place
 from rig.acquisition.capture.results import CaptureResult, DryRun, SelfTest, SyncCheck
 from rig.acquisition.capture.rig import Rig
 from rig.acquisition.session.records import VerdictEntry
@@ -56,6 +57,8 @@ def run_test(
         return self_test_outcome(rig.self_test(sessions.root))
     if request.test == "dry-run":
         return _dry_run(request, rig, running)
+    if request.adopt and rig.station.path is not None:
+        writable_place(rig.station.path, overwrite=True)
     check = rig.sync_check(request.captures, progress=running.report, cancel=running.cancel)
     if not request.adopt or check.timings is None:
         return sync_outcome(check)

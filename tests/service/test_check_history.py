@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
 
 from common.errors import ConflictError, InputError
+from common.files.ownership import MARKER, foreign, mark
 from service.cli.commands.check import HISTORY_PAGE, _add_to_history, _earlier
 
 
@@ -47,3 +49,35 @@ def test_a_place_that_cannot_be_is_told_before_the_work(tmp_path: Path, out: Pat
     for place in (out / "check.json", out / "check.json" / "history", tmp_path / "link"):
         with pytest.raises(InputError, match=r"is (a file|no folder)"):
             _earlier(place)
+
+
+@pytest.mark.parametrize("kind", ["link", "text", "pipe", "folder"])
+def test_a_list_that_is_not_ours_is_refused_and_left(tmp_path: Path, out: Path, kind: str) -> None:
+    history, notes = tmp_path / "history", tmp_path / "notes.json"
+    history.mkdir()
+    marker = history / MARKER
+    notes.write_text('{"precious": "anna"}')
+    if kind == "link":
+        marker.symlink_to(notes)
+    elif kind == "text":
+        marker.write_bytes(notes.read_bytes())
+    elif kind == "pipe":
+        os.mkfifo(marker)
+    else:
+        marker.mkdir()
+    before = marker.lstat()
+    for work in (lambda: _earlier(history), lambda: _add_to_history(out, history, "2026")):
+        with pytest.raises(ConflictError, match=f"{MARKER} was not written by this program"):
+            work()
+    assert notes.read_text() == '{"precious": "anna"}' and marker.lstat() == before
+
+
+def test_a_history_in_a_folder_of_results_leaves_them_ours(tmp_path: Path, out: Path) -> None:
+    results = tmp_path / "cal"
+    results.mkdir()
+    (results / "calibration.json").write_text("{}")
+    mark(results)
+    _add_to_history(out, results, "20260101")
+    assert _earlier(results)
+    (results / "check-20260101.json").unlink()
+    assert foreign(results) is None

@@ -7,10 +7,12 @@ import shutil
 from pathlib import Path
 
 import pytest
-from recognition_faces import front, small_gallery
+from recognition_faces import fields, front, small_gallery
 from service_helpers import files_under, rigwright_here
 
+from common.errors import ConflictError
 from evaluation.recognition.galleryfile import read_gallery, write_gallery
+from service.cli.commands.recognise import _new_gallery
 
 
 @pytest.fixture(scope="module")
@@ -82,6 +84,27 @@ def test_bad_input_is_one_line_and_leaves_nothing(
     assert words in told[0]
     assert "; " in told[0]
     assert files_under(tmp_path) == before
+
+
+def test_training_does_not_replace_those_who_were_enrolled(folder: Path, tmp_path: Path) -> None:
+    images, _ = fields(2, 1, 0.1, seed=7)
+    place = tmp_path / "lab.npz"
+    filled = small_gallery().enrolled("anna", images[0]).enrolled("Bea 2", images[1])
+    write_gallery(place, filled)
+    train = ("recognise", "train", "--population", "generator:12", "--out", "lab.npz", "--force")
+    done = rigwright_here(*train, cwd=tmp_path)
+    assert done.returncode == 2
+    assert "a gallery in which anna and 1 more would be lost" in done.stderr
+    assert list(read_gallery(place).persons) == ["anna", "Bea 2"]
+    # Enrolled while a model was being trained, which takes long.
+    shutil.copy(folder / "model.npz", place)
+    with (
+        pytest.raises(ConflictError, match="anna and 1 more would be lost"),
+        _new_gallery(place, overwrite=True, enrolled_may_go=False) as made,
+    ):
+        (made / "gallery.npz").write_bytes((folder / "model.npz").read_bytes())
+        write_gallery(place, filled, overwrite=True)
+    assert list(read_gallery(place).persons) == ["anna", "Bea 2"]
 
 
 @pytest.mark.parametrize("command", ["train", "enrol", "verify"])

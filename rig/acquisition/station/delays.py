@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from common.errors import InputError
@@ -22,10 +22,11 @@ class Timing:
 def with_timings(text: str, timings: Mapping[str, Timing], name: str = "station") -> str:
     """The station file ``text`` with new delays by camera name; comments and order stay.
 
-    Raises :class:`InputError` for a name that the file does not have.
+    So do the ends of its lines. Raises :class:`InputError` for a name that the file does not have.
     """
     import tomlkit
 
+    end_of_line = "\r\n" if "\r\n" in text else "\n"
     station = parse_station(text, name)
     for camera in timings:
         station.camera(camera)
@@ -33,8 +34,10 @@ def with_timings(text: str, timings: Mapping[str, Timing], name: str = "station"
     for table in document["camera"]:
         found = timings.get(str(table["name"]))
         if found is not None:
-            table["delay_us"] = round(found.delay_us, 1)
-            table["expected_lag_us"] = round(found.expected_lag_us, 1)
+            for key, value in asdict(found).items():
+                item = tomlkit.item(round(value, 1))
+                item.trivia.trail = end_of_line
+                table[key] = item
     written = tomlkit.dumps(document)
     parse_station(written, name)
     return written
@@ -46,7 +49,7 @@ def write_timings(path: Path, timings: Mapping[str, Timing]) -> None:
     Raises :class:`InputError` when it cannot be read or written.
     """
     try:
-        text = with_timings(path.read_text(encoding="utf-8"), timings, path.name)
+        text = with_timings(path.read_bytes().decode(), timings, path.name)
     except OSError as error:
         raise InputError(
             "station-unreadable",

@@ -122,6 +122,7 @@ def _targets_beside(reference: Path) -> Path:
 
 def _earlier(history: Path | None) -> dict[str, Path]:
     from common.errors import InputError
+    from common.files.ownership import refuse_other_list
 
     if history is None:
         return {}
@@ -132,6 +133,7 @@ def _earlier(history: Path | None) -> dict[str, Path]:
             )
     if not history.exists():
         return {}
+    refuse_other_list(history)
     _refuse_foreign_page(history / HISTORY_PAGE)
     found = sorted(history.glob("check-*.json"))
     return {f"check-{number}": path for number, path in enumerate(found)}
@@ -163,7 +165,7 @@ def _is_ours(page: Path) -> bool:
 
 
 def _add_to_history(out: Path, history: Path, made_utc: str) -> None:
-    from common.files.ownership import files_of, mark
+    from common.files.ownership import mark_also
     from common.files.writing import write_whole
 
     history.mkdir(parents=True, exist_ok=True)
@@ -173,7 +175,7 @@ def _add_to_history(out: Path, history: Path, made_utc: str) -> None:
     if page.exists():
         shown = history / HISTORY_PAGE
         write_whole(shown, page.read_bytes(), overwrite=True)
-        mark(history, [path for path in files_of(history).values() if path != shown])
+        mark_also(history, shown)
 
 
 def _free(folder: Path, stem: str) -> Path:

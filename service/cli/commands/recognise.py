@@ -62,7 +62,9 @@ def recognise_train(
     false_match_rate: Annotated[
         float, typer.Option(metavar="RATE", help="How many strangers may be taken for a person.")
     ] = 0.001,
-    force: Annotated[bool, typer.Option("--force", help="Replace a former model.")] = False,
+    force: Annotated[
+        bool, typer.Option("--force", help="Replace a former model in which nobody is enrolled.")
+    ] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Train a model on many heads, and tell how often it errs on persons it has not seen.
@@ -78,7 +80,7 @@ def recognise_train(
 
     with one_line_errors():
         request, inputs = _population(folder, population, seed, false_match_rate)
-        with _new_gallery(out, overwrite=force) as made:
+        with _new_gallery(out, overwrite=force, enrolled_may_go=False) as made:
             result = run_task(TRAINING, request, inputs, made)
         if as_json:
             print_result_json(result, {out.name: out})
@@ -114,7 +116,7 @@ def recognise_enrol(
 
     with one_line_errors(), _locked(gallery):
         inputs = {"gallery": _base(gallery, model), "face": face}
-        with _new_gallery(gallery, overwrite=True) as made:
+        with _new_gallery(gallery, overwrite=True, enrolled_may_go=True) as made:
             result = run_task(ENROLMENT, EnrolmentRequest(name=name), inputs, made)
         if as_json:
             print_result_json(result, {gallery.name: gallery})
@@ -198,13 +200,15 @@ def _base(gallery: Path, model: Path | None) -> Path:
 
 
 @contextmanager
-def _new_gallery(path: Path, *, overwrite: bool) -> Iterator[Path]:
-    """A folder for a task to write a gallery into, which then becomes ``path``."""
+def _new_gallery(path: Path, *, overwrite: bool, enrolled_may_go: bool) -> Iterator[Path]:
+    """A folder for a task to write a gallery into, which then becomes ``path``.
+
+    Unless ``enrolled_may_go`` no gallery is replaced in which somebody is enrolled.
+    """
     import tempfile
 
     from common.errors import ConflictError, InputError
     from common.files.writing import writable_place, write_whole
-    from evaluation.recognition.galleryfile import read_gallery
 
     if path.is_dir() or not path.parent.is_dir():
         what = f"{path} is a folder" if path.is_dir() else f"there is no folder {path.parent}"
@@ -212,13 +216,31 @@ def _new_gallery(path: Path, *, overwrite: bool) -> Iterator[Path]:
     if path.exists():
         if not overwrite:
             raise ConflictError("file-exists", f"{path} is there already", "give --force")
-        # What is no gallery is not replaced, whatever was said.
-        read_gallery(path)
+        _refuse_loss(path, enrolled_may_go=enrolled_may_go)
     writable_place(path, overwrite=overwrite)
     with tempfile.TemporaryDirectory(prefix="rigwright-") as temporary:
         yield Path(temporary)
         data = (Path(temporary) / "gallery.npz").read_bytes()
+        if overwrite and path.exists():
+            # Looked at again: training takes long, and somebody may be enrolled by now.
+            _refuse_loss(path, enrolled_may_go=enrolled_may_go)
         write_whole(path, data, overwrite=overwrite, private=True)
+
+
+def _refuse_loss(path: Path, *, enrolled_may_go: bool) -> None:
+    """Refuse to replace what is no gallery, whatever was said, and persons who were enrolled."""
+    from common.errors import ConflictError
+    from evaluation.recognition.galleryfile import read_gallery
+
+    persons = list(read_gallery(path).persons)
+    if persons and not enrolled_may_go:
+        others = f" and {len(persons) - 1} more" if len(persons) > 1 else ""
+        raise ConflictError(
+            "gallery-enrolled",
+            f"{path} is a gallery in which {persons[0]}{others} would be lost: nobody can be"
+            " enrolled again but from their face",
+            "give another --out, or remove the file yourself",
+        )
 
 
 @contextmanager

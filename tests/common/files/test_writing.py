@@ -130,3 +130,54 @@ def test_a_disk_without_links_that_fails_at_the_end_leaves_no_empty_file(
     with pytest.raises(OSError, match="input/output"):
         put_new(part, place)
     assert [p.name for p in tmp_path.iterdir()] == ["part"]
+
+
+def test_what_is_write_protected_is_not_replaced(tmp_path: Path) -> None:
+    path = tmp_path / "station.toml"
+    path.write_text("theirs")
+    (tmp_path / "link").symlink_to(path)
+    # Whoever runs this may be an administrator, to whom the system refuses nothing.
+    for mode in (0o400, 0o464, 0o077):
+        path.chmod(mode)
+        for name, private in ((path, False), (path, True), (tmp_path / "link", False)):
+            with pytest.raises(InputError, match="is write-protected; make it writable"):
+                write_whole(name, b"ours", overwrite=True, private=private)
+        path.chmod(0o600)
+        assert path.read_text() == "theirs"
+
+
+def test_what_is_replaced_keeps_its_attributes_but_not_its_times(tmp_path: Path) -> None:
+    path = tmp_path / "station.toml"
+    path.write_text("old")
+    os.utime(path, (1, 1))
+    try:
+        os.setxattr(path, "user.who", b"anna")
+    except OSError:
+        pytest.skip("no extended attributes in the folder for temporary files")
+    write_whole(path, b"new", overwrite=True)
+    assert os.getxattr(path, "user.who") == b"anna"
+    assert path.stat().st_mtime > 1
+
+
+@pytest.mark.parametrize("private", [False, True])
+def test_an_administrator_leaves_files_to_their_owner(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, private: bool
+) -> None:
+    given: list[tuple[str, int, int]] = []
+
+    def chown(path: Path, user: int, group: int) -> None:
+        given.append((path.name[:10], user, group))
+        if user >= 0:
+            raise PermissionError
+
+    path, place = tmp_path / "keys.json", tmp_path.stat()
+    path.write_text("old")
+    path.chmod(0o4640)
+    there = path.stat()
+    monkeypatch.setattr(os, "chown", chown)
+    write_whole(path, b"new", overwrite=True, private=private)
+    assert given == [(".rigwright", -1, there.st_gid), (".rigwright", there.st_uid, -1)]
+    assert path.stat().st_mode & 0o7777 == (0o600 if private else 0o4640)
+    given.clear()
+    write_whole(tmp_path / "new", b"new", private=private)
+    assert [user for _, user, _ in given] == ([-1, place.st_uid] if private else [])

@@ -63,6 +63,14 @@ def test_the_file_is_replaced_whole_and_keeps_its_mode(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == [path]
 
 
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+def test_the_ends_of_all_lines_stay(tmp_path: Path, end: str) -> None:
+    path = tmp_path / "station.toml"
+    path.write_bytes(TEXT.replace("\n", end).encode())
+    write_timings(path, FOUND)
+    assert path.read_bytes().decode() == with_timings(TEXT, FOUND).replace("\n", end)
+
+
 def test_what_cannot_be_written_leaves_the_file_as_it_was(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
