@@ -16,6 +16,7 @@ from fastapi import FastAPI
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from common.errors import InputError
+from common.files.reading import plain_size
 from service.api.context import Service
 
 _GRACE_S = 2
@@ -118,6 +119,8 @@ def _certificate(cert: Path | None, key: Path | None) -> ssl.SSLContext | None:
         raise InputError("tls", "a certificate goes with its key", "give --tls-cert and --tls-key")
     context = ssl.create_default_context(ssl.Purpose.CLIENT_AUTH)
     try:
+        for file in (cert, key):
+            plain_size(file)
         # Nobody is there to type the password of a key that has one.
         context.load_cert_chain(cert, key, password="")
     except (OSError, ValueError) as error:

@@ -15,6 +15,7 @@ import numpy as np
 from calibration.detection import opencv
 from calibration.detection.opencv import AnyImage, Bytes
 from common.errors import InputError
+from common.files.reading import plain_size
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -96,7 +97,7 @@ def read_colour(path: Path) -> AnyImage:
 
 def _bytes_of(path: Path, name: str) -> bytes:
     try:
-        if path.stat().st_size > LARGEST_BYTES:
+        if plain_size(path) > LARGEST_BYTES:
             raise InputError("image-size", f"{name} is larger than a picture", _TAKEN)
         return path.read_bytes()
     except OSError as error:

@@ -17,9 +17,10 @@ from calibration.files.packing import PackedCovariance, compact, packed, unpacke
 from calibration.observations import Carrier, Distance, TargetSet
 from common.errors import InputError
 from common.files.plain import plain
+from common.files.reading import read_limited
 from common.files.records import model_of, record_of
 from common.files.strict import StrictModel, parsed
-from common.files.writing import read_limited, write_whole
+from common.files.writing import write_whole
 from geometry.arrays import Floats
 from geometry.frames import Pose
 

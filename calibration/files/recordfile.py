@@ -9,9 +9,10 @@ from typing import Any, Generic, Literal, TypeVar
 from pydantic import Field, create_model
 
 from common.files.plain import plain
+from common.files.reading import read_limited
 from common.files.records import model_of, record_of
 from common.files.strict import StrictModel, parsed
-from common.files.writing import read_limited, write_whole
+from common.files.writing import write_whole
 
 RecordT = TypeVar("RecordT")
 

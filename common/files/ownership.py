@@ -15,6 +15,7 @@ from collections.abc import Collection, Iterator
 from pathlib import Path
 
 from common.errors import ConflictError
+from common.files.reading import json_in
 from common.files.writing import put_whole
 
 MARKER = ".rigwright.json"
@@ -101,14 +102,13 @@ def _listed(folder: Path) -> dict[str, str] | None:
     """The list; None where there is none, or one that is not whole."""
     marker = folder / MARKER
     try:
-        # Reading a pipe would wait for somebody to write into it.
-        if not stat.S_ISREG(marker.lstat().st_mode):
+        if marker.is_symlink():
             return None
-        document = json.loads(marker.read_text(encoding="utf-8"))
+        document = json_in(marker)
         if document["schema"] != SCHEMA:
             return None
         return {str(name): str(digest) for name, digest in document["sha256"].items()}
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return None
 
 

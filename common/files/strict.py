@@ -6,6 +6,7 @@ nearest that the file may have there.
 
 from __future__ import annotations
 
+import codecs
 import dataclasses
 import json
 from collections.abc import Mapping
@@ -90,7 +91,10 @@ def _spell(location: tuple[int | str, ...]) -> str:
 
 
 def _given(value: object) -> str:
-    text = repr(value)
+    try:
+        text = repr(value)
+    except (ValueError, RecursionError):
+        return "too long, or nested too deeply, to be shown"
     return text if len(text) <= 40 else f"{text[:37]}..."
 
 
@@ -142,6 +146,8 @@ def parsed(model: type[ModelT], text: str | bytes, source: str) -> ModelT:
 
     Strict as JSON is: its lists serve for tuples, its texts for paths.
     """
+    if isinstance(text, bytes):
+        text = text.removeprefix(codecs.BOM_UTF8)
     try:
         return model.model_validate_json(text)
     except ValidationError as error:
@@ -153,7 +159,15 @@ def as_json(model: type[ModelT], data: Mapping[str, Any], source: str) -> ModelT
 
     Strict Python input would want tuples and paths, which TOML does not have.
     """
-    return parsed(model, json.dumps(data, default=str), source)
+    return parsed(model, _as_json(data, source), source)
+
+
+def _as_json(data: object, source: str) -> str:
+    try:
+        return json.dumps(data, default=str)
+    except (ValueError, RecursionError) as error:
+        problem = f"{source} has a number that is too long, or is nested too deeply"
+        raise InputError("value", problem, "mend it") from error
 
 
 def section_of(kind: type[RecordT], data: Mapping[str, Any], section: str) -> RecordT:
@@ -163,7 +177,7 @@ def section_of(kind: type[RecordT], data: Mapping[str, Any], section: str) -> Re
     holder = create_model("Holder", __config__=STRICT, **fields)
     try:
         # As JSON, for the reason above.
-        read = holder.model_validate_json(json.dumps({section: data}, default=str))
+        read = holder.model_validate_json(_as_json({section: data}, section))
     except ValidationError as error:
         raise one_line(error, holder, "") from error
     value: RecordT = getattr(read, section)

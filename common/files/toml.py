@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from common.errors import InputError, TooLargeError
+from common.files.reading import BYTE_ORDER_MARK, plain_size
 
 LARGEST_FILE_BYTES = 1_000_000
 """What people write by hand is a page or two; a larger file is another one, given by mistake."""
@@ -20,7 +21,7 @@ def read_text(path: Path, kind: str, words: str, largest_bytes: int = LARGEST_FI
     """
     remedy = f"give a {words} as TOML"
     try:
-        if path.stat().st_size > largest_bytes:
+        if plain_size(path) > largest_bytes:
             problem = f"{path.name} is too large for a {words}"
             raise TooLargeError(f"{kind}-too-large", problem, remedy)
         return path.read_text(encoding="utf-8")
@@ -35,9 +36,17 @@ def read_text(path: Path, kind: str, words: str, largest_bytes: int = LARGEST_FI
 
 
 def parsed(text: str, name: str, kind: str, words: str) -> dict[str, Any]:
-    """A file's text as data; ``name`` stands in front of the error."""
+    """A file's text as data; ``name`` stands in front of the error.
+
+    A mark of the byte order, which some editors put in front unseen, is left out of account.
+    """
     try:
-        return tomllib.loads(text)
+        return tomllib.loads(text.removeprefix(BYTE_ORDER_MARK))
     except tomllib.TOMLDecodeError as error:
-        problem = f"{name} is not a {words}: {error}"
-        raise InputError(f"{kind}-not-toml", problem, "write it as TOML") from error
+        why = str(error)
+    except ValueError:
+        why = "a number in it has more digits than can be read"
+    except RecursionError:
+        why = "it is nested too deeply"
+    problem = f"{name} is not a {words}: {why}"
+    raise InputError(f"{kind}-not-toml", problem, "write it as TOML")

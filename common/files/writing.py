@@ -13,7 +13,6 @@ from pathlib import Path
 
 from common.errors import ConflictError, InputError
 
-LARGEST_BYTES = 200_000_000
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _NO_LINKS = (errno.EPERM, errno.EOPNOTSUPP, errno.ENOSYS, errno.EMLINK)
 
@@ -175,23 +174,3 @@ def _unwritable(path: Path, error: OSError) -> InputError:
         remedy = "give a name in a folder that is there"
     why = (error.strerror or "unwritable").lower()
     return InputError("file-write", f"{path.name} cannot be written ({why})", remedy)
-
-
-def read_limited(path: Path) -> bytes:
-    """A file's bytes; raises :class:`InputError` when it is missing or far too large."""
-    try:
-        found = path.stat()
-        if not (stat.S_ISREG(found.st_mode) or stat.S_ISDIR(found.st_mode)):
-            # Reading a pipe would wait for somebody to write into it.
-            raise InputError("file-read", f"{path.name} is no plain file", "check the path")
-        if found.st_size > LARGEST_BYTES:
-            raise InputError(
-                "file-too-large",
-                f"{path.name} has more than {LARGEST_BYTES // 1_000_000} MB",
-                "give a file that this program wrote",
-            )
-        return path.read_bytes()
-    except OSError as error:
-        raise InputError(
-            "file-read", f"{path.name} cannot be read ({error.strerror})", "check the path"
-        ) from error

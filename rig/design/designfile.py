@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from common.errors import InputError, TooLargeError
+from common.errors import InputError
+from common.files.reading import read_json
 from common.files.strict import validated
 from common.version import program_version
 from geometry.arrays import Floats
@@ -145,23 +145,7 @@ def read_design(path: Path, default_camera: Camera | None = None) -> ReadDesign:
     ``default_camera`` supplies lens and body where the file describes an existing rig by its
     poses and camera matrices only.
     """
-    try:
-        if path.stat().st_size > LARGEST_FILE_BYTES:
-            raise TooLargeError(
-                "design-too-large",
-                f"{path.name} is too large for a design file",
-                "give a design.json",
-            )
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        reason = (error.strerror or "unreadable").lower()
-        raise InputError(
-            "design-unreadable", f"cannot read the design file {path} ({reason})", "check the path"
-        ) from error
-    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
-        raise InputError(
-            "design-not-json", f"{path.name} is not JSON", "give a design.json"
-        ) from error
+    data = read_json(path, "design", "design file", LARGEST_FILE_BYTES)
     return design_from_mapping(data, path.name, default_camera)
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from pydantic import BaseModel, Field, FiniteFloat, ValidationError
 
 from common.errors import InputError
+from common.files.reading import plain_bytes
 from geometry.arrays import Floats
 from rig.design.layout import DATUM_NOTE, Collision, Layout, Neighbour, Placement
 
@@ -130,7 +131,7 @@ def read_datum(path: Path) -> Floats | None:
     Raises :class:`InputError` ``layout-file`` for a file that is no layout.
     """
     try:
-        read = _DatumOnly.model_validate_json(path.read_bytes())
+        read = _DatumOnly.model_validate_json(plain_bytes(path))
     except FileNotFoundError:
         return None
     except (OSError, ValidationError) as error:

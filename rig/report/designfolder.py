@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from common.files.folders import refuse_others, whole_folder
+from common.files.reading import json_in
 from geometry.preparation import PreparedSubject
 from rig.design.designfile import SCHEMA, design_document
 from rig.design.layout import Layout
@@ -127,7 +128,7 @@ def check_design_folder(out: Path) -> None:
 
 def _holds_design(out: Path) -> bool:
     try:
-        document = json.loads((out / "design.json").read_text(encoding="utf-8"))
+        document = json_in(out / "design.json")
         return bool(document["schema"] == SCHEMA)
     except (OSError, ValueError, KeyError, TypeError):
         return False

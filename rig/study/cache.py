@@ -7,6 +7,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from common.errors import RigwrightError
+from common.files.reading import plain_bytes
 from common.files.strict import parsed
 from common.files.writing import write_whole
 from rig.study.unit import UnitResult
@@ -31,7 +32,7 @@ class UnitCache:
         """The result of the unit with this key; None where there is none that can be used."""
         path = self._path(key)
         with suppress(OSError, RigwrightError):
-            found = parsed(UnitResult, path.read_bytes(), path.name)
+            found = parsed(UnitResult, plain_bytes(path), path.name)
             return found if found.key == key else None
         return None
 

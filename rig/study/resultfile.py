@@ -10,8 +10,8 @@ from typing import Literal
 from pydantic import Field
 
 from common.errors import InputError
+from common.files.reading import read_limited
 from common.files.strict import StrictModel, Vector, parsed
-from common.files.writing import read_limited
 from rig.study.grid import Choice
 from rig.study.studyfile import Study
 from rig.study.unit import Figure, HeadFigures, Place

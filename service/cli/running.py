@@ -99,6 +99,9 @@ def _require_file(path: Path) -> None:
         raise InputError("no-file", f"there is no file {path}", "check the path")
     if path.is_dir():
         raise InputError("no-file", f"{path} is a folder", "give a file")
+    if not path.is_file():
+        # Reading a pipe would wait for somebody to write into it.
+        raise InputError("no-file", f"{path} is no plain file", "give a file")
     if not os.access(path, os.R_OK):
         raise InputError("no-file", f"{path} may not be read", "change its permissions")
 

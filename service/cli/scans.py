@@ -8,6 +8,7 @@ import os
 from pathlib import Path
 
 from common.errors import InputError
+from common.files.reading import json_in
 
 FILE = "scan.json"
 SCHEMA = "rigwright.design-scan/1"
@@ -44,7 +45,7 @@ def scan_of(design: Path) -> Path:
 
 def _noted(file: Path) -> tuple[str, str] | None:
     try:
-        document = json.loads(file.read_text(encoding="utf-8"))
+        document = json_in(file)
         if document["schema"] != SCHEMA:
             return None
         return str(document["path"]), str(document["sha256"])
@@ -55,7 +56,7 @@ def _noted(file: Path) -> tuple[str, str] | None:
 def _named(design: Path) -> Path:
     """The scan that a design names, in the design's own folder."""
     try:
-        name = str(json.loads(design.read_text(encoding="utf-8"))["scan"]["name"])
+        name = str(json_in(design)["scan"]["name"])
     except (OSError, ValueError, KeyError, TypeError):
         name = ""
     beside = design.parent / Path(name).name

@@ -14,8 +14,9 @@ from pydantic import AwareDatetime, Field
 
 from common.errors import ConflictError, InputError, NotFoundError
 from common.files.lock import LockHeldError, lock_folder
+from common.files.reading import read_limited
 from common.files.strict import StrictModel, parsed
-from common.files.writing import read_limited, write_whole
+from common.files.writing import write_whole
 from service.keys.scope import Scope
 
 FILE_NAME = "keys.json"

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from common.errors import InputError, NotFoundError
+from common.files.reading import plain_bytes
 from rig.acquisition.session import paths
 from rig.acquisition.session.jsonfiles import digest, read_model
 from rig.acquisition.session.records import CaptureRecord, FileEntry, InterruptedEntry, SessionFile
@@ -55,10 +56,16 @@ def read_index(folder: Path, disk: Disk) -> SessionIndex:
     """
     path = folder / paths.SESSION
     try:
-        data = path.read_bytes()
+        data = plain_bytes(path)
     except (FileNotFoundError, NotADirectoryError) as error:
         raise NotFoundError(
             "session-not-found", f"{folder} is not a session", "give a session's folder"
+        ) from error
+    except OSError as error:
+        if path.is_file():
+            raise
+        raise InputError(
+            "session-damaged", f"{path} is no plain file", "restore it from a copy"
         ) from error
     manifest = read_model(SessionFile, data, paths.SESSION)
     if digest(manifest) != manifest.digest:
@@ -73,7 +80,7 @@ def read_index(folder: Path, disk: Disk) -> SessionIndex:
 
 def _record(folder: Path, listed: FileEntry) -> CaptureRecord:
     try:
-        data = (folder / listed.path).read_bytes()
+        data = plain_bytes(folder / listed.path)
     except OSError as error:
         raise InputError(
             "session-damaged", f"{folder / listed.path} is missing", "restore it from a copy"

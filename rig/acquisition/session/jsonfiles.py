@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from common.errors import InputError
+from common.files.reading import json_data
 from common.files.strict import StrictModel, validated
 from rig.acquisition.session.records import FileEntry, SessionFile
 from rig.acquisition.session.storage import sha256
@@ -28,8 +29,8 @@ def model_bytes(model: StrictModel) -> bytes:
 def read_model(model: type[ModelT], data: bytes, source: str) -> ModelT:
     """A record from a JSON file; raises a one-line :class:`InputError` that names ``source``."""
     try:
-        document = json.loads(data)
-    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
+        document = json_data(data)
+    except ValueError as error:
         raise InputError(
             "session-not-json", f"{source} is not JSON", "restore it from a copy"
         ) from error

@@ -12,6 +12,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from common.errors import InputError
+from common.files.reading import plain_bytes
 from rig.acquisition.session import paths
 from rig.acquisition.session.commit import clear_stage, publish, set_aside, write_index
 from rig.acquisition.session.index import SessionIndex
@@ -99,7 +100,7 @@ def interrupted(capture_id: str, fate: str, why: str) -> InterruptedEntry:
 def _whole_record(index: SessionIndex, stage: Path) -> CaptureRecord | None:
     """The record of a stage, when everything it names is there and right."""
     try:
-        data = (stage / paths.STAGED_RECORD).read_bytes()
+        data = plain_bytes(stage / paths.STAGED_RECORD)
         record = read_model(CaptureRecord, data, paths.STAGED_RECORD)
     except (OSError, InputError):
         return None

@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from common.errors import InputError
+from common.files.reading import BYTE_ORDER_MARK
 from common.files.writing import write_whole
 from rig.acquisition.station.stationfile import parse_station
 
@@ -28,9 +29,10 @@ def with_timings(text: str, timings: Mapping[str, Timing], name: str = "station"
 
     end_of_line = "\r\n" if "\r\n" in text else "\n"
     station = parse_station(text, name)
+    mark = BYTE_ORDER_MARK if text.startswith(BYTE_ORDER_MARK) else ""
     for camera in timings:
         station.camera(camera)
-    document = tomlkit.parse(text)
+    document = tomlkit.parse(text.removeprefix(mark))
     for table in document["camera"]:
         found = timings.get(str(table["name"]))
         if found is not None:
@@ -38,7 +40,7 @@ def with_timings(text: str, timings: Mapping[str, Timing], name: str = "station"
                 item = tomlkit.item(round(value, 1))
                 item.trivia.trail = end_of_line
                 table[key] = item
-    written = tomlkit.dumps(document)
+    written = mark + tomlkit.dumps(document)
     parse_station(written, name)
     return written
 

@@ -7,6 +7,7 @@ import json
 from pathlib import Path
 
 from common.files.folders import refuse_others, whole_folder
+from common.files.reading import json_in
 from common.progress import (
     CancelToken,
     NeverCancelled,
@@ -78,7 +79,7 @@ def check_plan_folder(out: Path) -> None:
 def _listed(out: Path) -> set[str]:
     """Files of the plan that a folder holds, by its manifest; none when it has no sound one."""
     try:
-        document = json.loads((out / MANIFEST).read_text("utf-8"))
+        document = json_in(out / MANIFEST)
         if document["schema"] != SCHEMA:
             return set()
         return {str(entry["name"]) for entry in document["files"]} | {MANIFEST}

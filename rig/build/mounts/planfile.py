@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from common.errors import InputError, TooLargeError
+from common.files.reading import read_json
 from common.files.strict import validated
 from common.version import program_version
 from geometry.frames import Pose
@@ -77,19 +76,7 @@ def _mount_model(mount: CameraMount) -> MountModel:
 
 def read_plan(path: Path) -> MountPlan:
     """The plan of a file; raises a one-line :class:`InputError`."""
-    try:
-        if path.stat().st_size > LARGEST_FILE_BYTES:
-            raise TooLargeError(
-                "plan-too-large", f"{path.name} is too large for a plan file", "give a plan.json"
-            )
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        reason = (error.strerror or "unreadable").lower()
-        raise InputError(
-            "plan-unreadable", f"cannot read the plan file {path} ({reason})", "check the path"
-        ) from error
-    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
-        raise InputError("plan-not-json", f"{path.name} is not JSON", "give a plan.json") from error
+    data = read_json(path, "plan", "plan file", LARGEST_FILE_BYTES)
     return plan_from_mapping(data, path.name)
 
 

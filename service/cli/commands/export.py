@@ -107,10 +107,10 @@ def _file_in(given: Path) -> Path:
 
 def _schema(path: Path) -> str:
     """What a file says it is; nothing where it cannot be read, which its reader will tell."""
-    import json
+    from common.files.reading import json_in
 
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
+        document = json_in(path)
     except (OSError, ValueError):
         return ""
     return str(document.get("schema", "")) if isinstance(document, dict) else ""

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from common.errors import ConflictError, InputError
-from common.files.writing import neighbour, put_new, read_limited, with_parents, write_whole
+from common.files.writing import neighbour, put_new, with_parents, write_whole
 
 
 def names_in(folder: Path) -> list[str]:
@@ -93,12 +93,6 @@ def test_a_full_disk_is_told_as_one(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     with pytest.raises(InputError, match="free some space"):
         write_whole(tmp_path / "x", b"x")
     assert names_in(tmp_path) == []
-
-
-def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
-    os.mkfifo(tmp_path / "keys.json")
-    with pytest.raises(InputError, match="is no plain file"):
-        read_limited(tmp_path / "keys.json")
 
 
 def test_folders_made_for_nothing_go_again_and_only_those(tmp_path: Path) -> None:
