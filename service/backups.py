@@ -222,8 +222,10 @@ def _require_empty(data: Path) -> None:
     if not held:
         return
     remedy = "give a new one with --data"
-    if all(re.fullmatch(rf"{re.escape(_PART)}\w+", name) for name in held):
-        remedy = f"a restore was stopped and left {held[0]} there: remove that, or {remedy}"
+    parts = [name for name in held if re.fullmatch(rf"{re.escape(_PART)}\w+", name)]
+    if parts:
+        rest = "" if len(parts) == len(held) else ", and the rest if nothing in it is yours"
+        remedy = f"a restore was stopped and left {parts[0]} there: remove that{rest}, or {remedy}"
     raise ConflictError("restore-not-empty", f"the folder {data} is not empty", remedy)
 
 

@@ -57,6 +57,9 @@ STATUS_OF_CODE: Mapping[str, int] = {
 }
 """Where HTTP has a more telling status than that of the kind."""
 
+EXIT_CODE_OF_CODE: Mapping[str, int] = {"internal/disk-full": 2}
+"""Where the exit code is not that of the kind."""
+
 HTTP_ERRORS: Mapping[int, tuple[str, str, str]] = {
     400: ("input", "bad-request", "send a request as the documentation describes it"),
     404: ("not-found", "path", "see GET /v1 for what there is"),
@@ -76,7 +79,7 @@ def status_of(error: RigwrightError) -> int:
 
 def exit_code_of(error: RigwrightError) -> int:
     """The exit code of a command that ends with an error."""
-    return KINDS[error.kind].exit_code
+    return EXIT_CODE_OF_CODE.get(error.code, KINDS[error.kind].exit_code)
 
 
 def problem_document(error: RigwrightError) -> dict[str, object]:

@@ -18,6 +18,7 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 from common.errors import InputError
 from common.files.reading import plain_size
 from service.api.context import Service
+from service.settings import Settings
 
 _GRACE_S = 2
 """Open requests hear of the stop within a quarter of a second; this is for their last answers."""
@@ -109,6 +110,12 @@ def serve(service: Service, app: FastAPI, ready: Callable[[str], None]) -> None:
     config.ssl = tls
     with listening:
         asyncio.run(_Server(config, service, ready).serve([listening]))
+
+
+def refuse_address(settings: Settings) -> None:
+    """Raise what :func:`serve` would, before anything is made for it."""
+    _certificate(settings.tls_cert, settings.tls_key)
+    _listen(settings.host, settings.port).close()
 
 
 def _certificate(cert: Path | None, key: Path | None) -> ssl.SSLContext | None:

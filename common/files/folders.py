@@ -15,7 +15,7 @@ from common.errors import ConflictError, InputError
 from common.files.lock import KernelLock, LockHeldError, lock_folder
 from common.files.ownership import MARKER, files_of, foreign, mark
 from common.files.placing import NOT_REPLACED, put_in_place
-from common.files.writing import FULL, missing, remove_empty
+from common.files.writing import FULL, missing, remove_empty, with_parents
 
 _OF_THE_DISK = (*FULL, errno.EIO, errno.EROFS)
 _ANOTHER = "give another --out, or move it away yourself"
@@ -122,10 +122,10 @@ def grown_folder(
 def _begun(out: Path) -> KernelLock:
     """A marked folder, and the lock of whoever works in it."""
     try:
-        out.mkdir(parents=True, exist_ok=True)
-        if not (out / MARKER).exists():
-            mark(out)
-        return lock_folder(out)
+        with with_parents(out):
+            if not (out / MARKER).exists():
+                mark(out)
+            return lock_folder(out)
     except LockHeldError as error:
         remedy = "wait until it has ended, or give another --out"
         raise ConflictError("out-busy", f"another process works in {out}", remedy) from error

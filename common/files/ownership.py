@@ -16,7 +16,7 @@ from pathlib import Path
 
 from common.errors import ConflictError
 from common.files.reading import json_in
-from common.files.writing import put_whole
+from common.files.writing import is_unfinished, put_whole
 
 MARKER = ".rigwright.json"
 """The name of the list."""
@@ -130,12 +130,14 @@ def _why_foreign(
         return "is a link"
     if stat.S_ISDIR(mode):
         ours = any(known.startswith(f"{name}/") for known in listed) or path.resolve() in exempt
-        return None if ours and not os.path.ismount(path) else "is not ours"
+        if not ours or os.path.ismount(path):
+            return "is not ours"
+        return None if mode & stat.S_IWUSR else "is write-protected"
     if not stat.S_ISREG(mode):
         return "is no plain file"
     if not mode & stat.S_IWUSR:
         return "is write-protected"
-    if name == MARKER or path.resolve() in exempt:
+    if name == MARKER or path.resolve() in exempt or is_unfinished(path):
         return None
     if name not in listed:
         return "this program did not put there"

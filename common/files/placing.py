@@ -29,7 +29,8 @@ def put_in_place(new: Path, out: Path, may_go: Callable[[Path], None] | None) ->
     everybody's sight, with the place where it is now, and raises where it has to stay: then it
     stands in ``out`` again. Without ``may_go`` nothing but an empty folder is replaced. Raises
     :class:`ConflictError` then, and :class:`OSError`. What cannot be moved back, for whatever
-    reason, is left beside ``new`` under the name ``old``; :class:`InputError` says where.
+    reason, is left beside ``new`` under the name ``old``, and so is what cannot be removed;
+    :class:`InputError` says where.
     """
     _dress(new, out)
     if not (out.is_dir() and any(out.iterdir())):
@@ -48,7 +49,15 @@ def put_in_place(new: Path, out: Path, may_go: Callable[[Path], None] | None) ->
         if foreign(old) is None:
             old.rename(new)
         raise
-    shutil.rmtree(old, ignore_errors=True)
+    try:
+        shutil.rmtree(old)
+    except OSError as error:
+        raise InputError(
+            "out-remains",
+            f"{out} holds the new results, but of the former ones some cannot be removed"
+            f" ({(error.strerror or str(error)).lower()})",
+            f"remove {old.parent} yourself",
+        ) from error
 
 
 def _put_back(old: Path, out: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 import secrets
 import shutil
 import stat
@@ -14,6 +15,7 @@ from pathlib import Path
 from common.errors import ConflictError, InputError
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+_UNFINISHED = re.compile(r"\.rigwright-[0-9a-f]{16}")
 _NO_LINKS = (errno.EPERM, errno.EOPNOTSUPP, errno.ENOSYS, errno.EMLINK)
 
 
@@ -107,6 +109,19 @@ def writable_place(path: Path, *, overwrite: bool) -> Path:
 def neighbour(place: Path) -> Path:
     """A free name in the folder of ``place``, for a file on its way there; never too long."""
     return place.with_name(f".rigwright-{secrets.token_hex(8)}")
+
+
+def is_unfinished(path: Path) -> bool:
+    """Whether a plain file is one on its way, which only a process that was killed leaves."""
+    named = _UNFINISHED.fullmatch(path.name) is not None
+    return named and path.is_file() and not path.is_symlink()
+
+
+def remove_unfinished(folder: Path) -> None:
+    """Remove what a killed process left half written; call it where no other can write."""
+    for path in folder.glob(".rigwright-*"):
+        if is_unfinished(path):
+            path.unlink(missing_ok=True)
 
 
 def put_new(part: Path, place: Path) -> None:

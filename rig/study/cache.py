@@ -9,12 +9,10 @@ from pathlib import Path
 from common.errors import RigwrightError
 from common.files.reading import plain_bytes
 from common.files.strict import parsed
-from common.files.writing import write_whole
+from common.files.writing import remove_unfinished, write_whole
 from rig.study.unit import UnitResult
 
 _UNIT = re.compile(r"[0-9a-f]{64}\.json")
-_HALF = re.compile(r"\.[0-9a-f]{64}\.json\.[0-9a-f]{8}")
-"""As :func:`common.files.writing.write_whole` names what it has not finished."""
 
 
 def is_unit(path: Path) -> bool:
@@ -44,9 +42,7 @@ class UnitCache:
 
     def clean(self) -> None:
         """Remove what a killed process left half written."""
-        for path in self._folder.glob(".*.json.*"):
-            if _HALF.fullmatch(path.name):
-                path.unlink(missing_ok=True)
+        remove_unfinished(self._folder)
 
     def _path(self, key: str) -> Path:
         return self._folder / f"{key}.json"

@@ -43,7 +43,7 @@ def one_line_errors() -> Iterator[None]:
         sys.stderr.write(f"rigwright: {refused}\n")
         raise typer.Exit(exit_code_of(refused)) from None
     except RigwrightError as error:
-        if isinstance(error, InternalError):
+        if isinstance(error, InternalError) and kept.lines:
             # A fault of ours: whoever reports it needs more than one line.
             sys.stderr.write("\n".join(kept.lines) + "\n")
         sys.stderr.write(f"rigwright: {error}\n")

@@ -8,6 +8,7 @@ from contextlib import closing
 from pathlib import Path
 
 from common.errors import InputError
+from common.files.writing import is_unfinished
 
 DATABASE_NAME = "rigwright.sqlite3"
 _BEFORE_THE_DATABASE = {"lock", "lost+found", "keys.json"}
@@ -26,7 +27,8 @@ def refuse_foreign(folder: Path) -> None:
 
     Raises :class:`InputError` where ``folder`` holds any and no database of this program.
     """
-    names = {path.name for path in folder.iterdir()} - _BEFORE_THE_DATABASE
+    held = (path for path in folder.iterdir() if not is_unfinished(path))
+    names = {path.name for path in held} - _BEFORE_THE_DATABASE
     found = _tables_in(folder / DATABASE_NAME)
     if found >= _OUR_TABLES:
         return

@@ -205,6 +205,11 @@ def test_the_remains_of_a_stopped_restore_are_told(tmp_path: Path, backup: Path)
     (tmp_path / "new" / ".restore-ab12cd").mkdir(parents=True)
     with pytest.raises(ConflictError, match="a restore was stopped and left"):
         restore(backup, tmp_path / "new")
+    # Stopped while all was put in its place.
+    (tmp_path / "new" / "lock").touch()
+    with pytest.raises(ConflictError, match=r"left \.restore-ab12cd there: remove that, and the"):
+        restore(backup, tmp_path / "new")
+    (tmp_path / "new" / "lock").unlink()
     # A disk of its own has this folder from the beginning.
     (tmp_path / "new" / ".restore-ab12cd").rename(tmp_path / "new" / "lost+found")
     restore(backup, tmp_path / "new")

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import os
 import shutil
+import socket
 import sqlite3
 from contextlib import closing
 from pathlib import Path
 
 import pytest
-from service_helpers import files_under
+from service_helpers import files_under, rigwright_here
 
 from common.errors import ConflictError, InputError
 from service.cli.commands.check import _earlier
 from service.store import DATABASE_NAME, Store
+from service.store.ours import refuse_foreign
 
 
 def names_in(folder: Path) -> list[str]:
@@ -181,3 +183,22 @@ def test_a_page_of_others_is_no_history(tmp_path: Path) -> None:
     page.unlink()
     page.write_text('<html><meta name="generator" content="Rigwright"></html>')
     assert _earlier(tmp_path) == {}
+
+
+def test_what_a_killed_command_left_is_no_file_of_others(tmp_path: Path) -> None:
+    (tmp_path / ".rigwright-0123456789abcdef").write_text("half")
+    refuse_foreign(tmp_path)
+    (tmp_path / ".rigwright-mine").write_text("whole")
+    with pytest.raises(InputError, match="rigwright-mine"):
+        refuse_foreign(tmp_path)
+
+
+def test_a_service_that_cannot_answer_makes_no_data_folder(tmp_path: Path) -> None:
+    (tmp_path / "cert.pem").write_text("none")
+    tls = ("--tls-cert", "cert.pem", "--tls-key", "cert.pem")
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = str(taken.getsockname()[1])
+        for given, words in ((("--port", port), "cannot listen"), (tls, "are no certificate")):
+            done = rigwright_here("serve", *given, "--data", "p/data", cwd=tmp_path)
+            assert done.returncode == 2 and words in done.stderr
+            assert not (tmp_path / "p").exists()

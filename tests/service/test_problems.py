@@ -59,6 +59,8 @@ def test_exit_codes() -> None:
         "input": 2, "too-large": 2, "not-found": 2, "conflict": 2, "unsatisfiable": 3,
         "device": 4, "interlock": 4, "cancelled": 130, "internal": 1,
     }  # fmt: skip
+    # No fault of the program, and told as any other write that has no room.
+    assert exit_code_of(errors.InternalError("disk-full", "p", "r")) == 2
 
 
 def test_special_statuses_belong_to_known_kinds() -> None:

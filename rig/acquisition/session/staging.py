@@ -6,6 +6,7 @@ import time
 from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from datetime import timedelta
+from pathlib import Path
 
 from common.errors import ConflictError, RigwrightError
 from rig.acquisition.session import paths
@@ -17,7 +18,7 @@ from rig.acquisition.session.pictures import filed
 from rig.acquisition.session.recording import FiledFrame, Numbering, make_record
 from rig.acquisition.session.records import CaptureRecord
 from rig.acquisition.session.recovery import interrupted
-from rig.acquisition.session.storage import disk_errors
+from rig.acquisition.session.storage import disk_errors, two_disks
 from rig.acquisition.station.spec import CapturePolicy
 from rig.acquisition.synchrony.cameraframes import Pair
 from rig.acquisition.synchrony.capturedata import CameraPart, CaptureData
@@ -51,6 +52,7 @@ class Stage:
                 "read it, or take a new one under another id",
             )
         with disk_errors(session.folder):
+            _refuse_other_disks(session.folder)
             session.index.disk.make_folder(self._folder)
 
     def may_fire(self, box_capture: str) -> None:
@@ -193,3 +195,14 @@ def picture_facts(
         iso=settings.iso,
         focal_length_mm=focal_mm,
     )
+
+
+def _refuse_other_disks(folder: Path) -> None:
+    """Refuse before anything fires what would fail when its pictures are put in place."""
+    home = folder.stat().st_dev
+    tops = (paths.IMAGES, paths.RAW, paths.CAPTURES, paths.INCOMPLETE, paths.INTERRUPTED)
+    for place in (folder / top for top in tops):
+        inner = place.iterdir() if place.is_dir() else ()
+        for held in (place.parent, place, *inner):
+            if held.is_dir() and held.stat().st_dev != home:
+                raise two_disks(folder, held)

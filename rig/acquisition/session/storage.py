@@ -108,12 +108,22 @@ def file_sha256(path: Path) -> str:
     return digest.hexdigest()
 
 
+def two_disks(folder: Path, elsewhere: Path) -> ConflictError:
+    """What a session that lies on two disks is told: nothing can be moved between them at once."""
+    where = f"{elsewhere} is on another" if elsewhere != folder else "a folder in it is on another"
+    return ConflictError(
+        "session-two-disks",
+        f"the session {folder} lies on two disks: {where}",
+        "move all of it to one disk, and give it there",
+    )
+
+
 @contextlib.contextmanager
 def disk_errors(folder: Path) -> Iterator[None]:
     """Give every trouble with the disk a name.
 
-    :class:`ConflictError` ``disk-full`` and ``disk-error``; :class:`InputError`
-    ``session-unwritable``.
+    :class:`ConflictError` ``disk-full``, ``session-two-disks`` and ``disk-error``;
+    :class:`InputError` ``session-unwritable``.
     """
     try:
         yield
@@ -125,6 +135,8 @@ def disk_errors(folder: Path) -> Iterator[None]:
                 f"there is no space left for {folder} ({reason})",
                 "free some, or choose a session on another disk",
             ) from error
+        if error.errno == errno.EXDEV:
+            raise two_disks(folder, folder) from error
         if error.errno in UNNAMEABLE:
             raise InputError(
                 "session-unwritable",

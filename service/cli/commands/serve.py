@@ -82,8 +82,9 @@ def run_serve_command(**given: object) -> None:
         from service.api.context import Service
         from service.client.notes import noted
         from service.kinds.queued import QUEUED
-        from service.server import serve
+        from service.server import refuse_address, serve
 
+        refuse_address(settings)
         service = Service(settings, QUEUED)
         stack.callback(service.close)
         stations = [worker.station for worker in service.rigs.all()]

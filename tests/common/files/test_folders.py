@@ -16,7 +16,8 @@ from typer.testing import CliRunner
 from common.errors import ConflictError, InputError
 from common.files import placing
 from common.files.folders import grown_folder, new_folder, whole_folder
-from common.files.ownership import MARKER, files_of, mark
+from common.files.ownership import MARKER, files_of, foreign, mark
+from common.files.writing import remove_unfinished
 from service.cli import app
 
 Maker = Callable[[Path], None]
@@ -503,3 +504,56 @@ def test_a_full_disk_is_told_and_leaves_nothing(tmp_path: Path) -> None:
     with pytest.raises(ConnectionError), new_folder(out, force=True):
         raise ConnectionError(errno.ECONNRESET, "not of the disk")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_full_disk_leaves_nothing_where_a_folder_is_to_grow(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(_: int) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with monkeypatch.context() as patched:
+        patched.setattr(os, "fsync", full)
+        with pytest.raises(InputError, match="free space"), grown(tmp_path / "new" / "out"):
+            raise AssertionError("the folder was given")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_write_protected_folder_in_results_is_not_replaced(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    ours(out)
+    (out / "parts").chmod(0o555)
+    with pytest.raises(ConflictError, match="parts, which is write-protected"):
+        new_folder(out, force=True).__enter__()
+    (out / "parts").chmod(0o755)
+
+
+def test_what_cannot_be_removed_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    out = tmp_path / "out"
+    ours(out)
+    remove = shutil.rmtree
+
+    def refuse(path: Path, *, ignore_errors: bool = False) -> None:
+        if path.name == "old":
+            raise PermissionError(errno.EPERM, "Operation not permitted")
+        remove(path, ignore_errors=ignore_errors)
+
+    monkeypatch.setattr(shutil, "rmtree", refuse)
+    with (
+        pytest.raises(InputError, match="holds the new results, but") as told,
+        new_folder(out, force=True) as folder,
+    ):
+        put(folder, new_json="{}")
+    (left,) = (path for path in tmp_path.iterdir() if path != out)
+    assert str(left) in str(told.value) and files_of(out).keys() == {"new.json"}
+    assert "design.json" in files_of(left / "old")
+
+
+def test_what_a_killed_process_left_half_written_is_ours(tmp_path: Path) -> None:
+    ours(tmp_path)
+    (tmp_path / ".rigwright-0123456789abcdef").write_text("half")
+    assert foreign(tmp_path) is None
+    (tmp_path / ".rigwright-notes").write_text("mine")
+    assert foreign(tmp_path) is not None
+    remove_unfinished(tmp_path)
+    assert {p.name for p in tmp_path.glob(".rigwright-*")} == {".rigwright-notes"}

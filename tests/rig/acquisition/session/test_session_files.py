@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import re
 import shutil
@@ -19,12 +20,14 @@ from memoryrig import CameraScript, memory_station
 from PIL import Image
 from PIL.ExifTags import IFD, Base
 
-from common.errors import InputError
+from common.errors import ConflictError, InputError
 from rig.acquisition.cameras.base import Frame, FrameStatus
 from rig.acquisition.session import paths
 from rig.acquisition.session.exif import PictureFacts, with_exif
 from rig.acquisition.session.folder import session_folder
 from rig.acquisition.session.pictures import filed
+from rig.acquisition.session.staging import Stage
+from rig.acquisition.session.storage import disk_errors
 from rig.acquisition.session.tables import tables
 from rig.acquisition.session.verify import SessionFindingKind, verify_session
 from rig.acquisition.station.spec import CapturePolicy, ImageFormat
@@ -391,3 +394,15 @@ def test_the_page_names_every_fault_and_place() -> None:
         assert bool(rows[kind.value]) == (kind in HARMLESS)
     for place in (*paths.TABLES, paths.SESSION, paths.INCOMPLETE, paths.INTERRUPTED):
         assert place in text
+
+
+def test_a_session_on_two_disks_is_told_before_anything_fires(bench: BenchMaker) -> None:
+    made = bench()
+    folder = made.session.folder
+    (folder / "images").symlink_to("/proc")
+    with pytest.raises(ConflictError, match="lies on two disks") as told:
+        Stage(made.session, "one")
+    assert told.value.code == "conflict/session-two-disks"
+    assert not (folder / paths.INCOMPLETE).exists()
+    with pytest.raises(ConflictError, match="lies on two disks"), disk_errors(folder):
+        raise OSError(errno.EXDEV, "Invalid cross-device link")
