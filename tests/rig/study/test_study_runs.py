@@ -70,7 +70,7 @@ def test_what_is_finished_is_not_computed_again(done: tuple[Path, list[UnitResul
     killed = next(cache.glob(f"{results[1].key}*"))
     text = killed.read_bytes()
     killed.unlink()
-    (cache / f".{killed.name}.12ab34cd").write_bytes(text[:20])  # what a kill leaves behind
+    (cache / ".rigwright-0123456789abcdef").write_bytes(text[:20])  # what a kill leaves behind
     computed: list[str] = []
 
     def note(unit: Unit) -> bool:
