@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from datetime import timedelta
 from typing import Annotated, Any
@@ -33,18 +33,24 @@ _SURFACES = (RECONSTRUCTION.name, COMPARISON.name)
 
 
 class Service:
-    """The parts of a running service. Opening it opens the store."""
+    """The parts of a running service. Opening it opens the store.
+
+    ``before_data`` may raise while no folder is made yet.
+    """
 
     def __init__(
         self,
         settings: Settings,
         kinds: Mapping[str, JobKind[Any, Any]],
         engine: Engine | None = None,
+        before_data: Callable[[Settings], None] | None = None,
     ) -> None:
         self.settings = settings
         if settings.asks_for_keys:
             require_a_key(settings.data_dir, settings.host)
         stations = read_stations(settings.stations)
+        if before_data is not None:
+            before_data(settings)
         self.store = Store(settings.data_dir, settled_elsewhere=STATION_KINDS)
         self.audit = AuditLog(settings.data_dir)
         ring = KeyRing(settings.data_dir, self.store.sign_ins)

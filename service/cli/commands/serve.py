@@ -84,8 +84,7 @@ def run_serve_command(**given: object) -> None:
         from service.kinds.queued import QUEUED
         from service.server import refuse_address, serve
 
-        refuse_address(settings)
-        service = Service(settings, QUEUED)
+        service = Service(settings, QUEUED, before_data=refuse_address)
         stack.callback(service.close)
         stations = [worker.station for worker in service.rigs.all()]
 
