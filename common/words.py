@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 
 
 def did_you_mean(word: str, known: Collection[str], otherwise: str | None = None) -> str:
@@ -28,3 +28,19 @@ def percent_cut(share: float, decimals: int = 2) -> str:
 def counted(count: int, noun: str) -> str:
     """How many of something, such as ``1 capture`` and ``2 captures``."""
     return f"{count} {noun}{'' if count == 1 else 's'}"
+
+
+def of_limits(broken: Sequence[str], most: int = 6) -> str:
+    """Limits by their kind, with what they are of: ``scale (cam01, cam02); coverage``.
+
+    ``broken`` are names such as ``scale/cam01``. Of each kind ``most`` are named, the rest counted.
+    """
+    groups: dict[str, list[str]] = {}
+    for name in broken:
+        kind, _, what = name.partition("/")
+        groups.setdefault(kind, []).extend([what] if what else [])
+    words = []
+    for kind, what in groups.items():
+        named = what if len(what) <= most else [*what[:most], f"{len(what) - most} more"]
+        words.append(f"{kind} ({', '.join(named)})" if named else kind)
+    return "; ".join(words)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from common.words import counted, did_you_mean, percent_cut
+from common.words import counted, did_you_mean, of_limits, percent_cut
 
 
 @pytest.mark.parametrize(
@@ -40,3 +40,11 @@ def test_every_share_of_whole_percents_is_told_as_it_is() -> None:
 
 def test_one_is_counted_without_an_s() -> None:
     assert [counted(k, "capture") for k in (0, 1, 2)] == ["0 captures", "1 capture", "2 captures"]
+
+
+def test_broken_limits_are_told_by_their_kind() -> None:
+    names = ["scale/cam01", "coverage", "scale/cam03", "near/cam01-cam02"]
+    assert of_limits(names) == "scale (cam01, cam03); coverage; near (cam01-cam02)"
+    many = [f"scale/cam{k}" for k in range(9)]
+    assert of_limits(many, 2) == "scale (cam0, cam1, 7 more)"
+    assert of_limits(many, 9).endswith("cam8)") and of_limits([]) == ""

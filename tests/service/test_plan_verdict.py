@@ -10,6 +10,7 @@ from plans import tslot_plan
 
 from rig.build.mounts.plan import Clash, Give, Sag, Stance
 from service.cli.commands.plan import caution, why_not
+from service.cli.tables.plan_tables import print_plan
 from service.kinds.plan import PlanClash, PlanNetwork, PlanPrice, PlanResult
 from service.tasks.planning import in_short
 
@@ -99,3 +100,17 @@ def test_of_a_rig_that_tips_over_it_is_told(tips_n: float, sound: bool) -> None:
     short = in_short(replace(tslot_plan(2), clashes=(), stances=(stance,)))
     assert bool(short.stances[0].too_little) != sound
     assert ("left foot is tipped away" in caution(short)) != sound
+
+
+def test_the_table_says_how_many_limits_rounding_breaks_and_which(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """In a cell they were cut to three equal words that did not say they were broken."""
+    names = [f"depth_of_field/cam0{k}" for k in range(1, 6)]
+    print_plan(result(designed=network(), built=network(*names, "base_height_neighbour/a-b")))
+    told = " ".join(capsys.readouterr().out.split())
+    assert "6 broken" in told and "kept" in told and "…" not in told
+    assert (
+        "broken each setting rounded: depth_of_field (cam01, cam02, cam03, cam04, cam05); "
+        "base_height_neighbour (a-b)"
+    ) in told

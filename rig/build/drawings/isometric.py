@@ -51,7 +51,11 @@ def isometric_sheets(plan: MountPlan, lines: Sequence[BillLine]) -> tuple[Sheet,
     items += balloons(view, _pointed(plan, lines, solids, view))
     top = A3_LANDSCAPE_MM[1] - MARGIN_MM - 6.0
     items.append(Text(view.view.title, MARGIN_MM + 5.0, top - 3.0, 2.6, bold=True))
-    table = Table("Parts, numbered as in the bill", COLUMNS, tuple(_rows(lines)))
+    table = Table(
+        "Parts, numbered as in the bill; screws, nuts and caps have no balloon",
+        COLUMNS,
+        tuple(_rows(lines)),
+    )
     more: list[Content] = []
     if table.height_mm() <= top - (MARGIN_MM + BLOCK_MM[1] + 6.0):
         items += table_items(table, A3_LANDSCAPE_MM[0] - MARGIN_MM - TABLE_MM, top, TABLE_MM - 5.0)

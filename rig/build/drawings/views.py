@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +12,15 @@ from rig.build.drawings.annotate import PITCH_MM, Labels, Ordinate, merged, ordi
 from rig.build.drawings.figures import POSE_COLUMNS, mm, pose_figures
 from rig.build.drawings.frame import A3_LANDSCAPE_MM, MARGIN_MM, Content, framed
 from rig.build.drawings.hidden import visible_lines
-from rig.build.drawings.items import CameraMark, Dimension, Item, Line, Sheet, Text
+from rig.build.drawings.items import (
+    CameraMark,
+    Dimension,
+    Item,
+    Line,
+    Sheet,
+    Text,
+    dimension_parts,
+)
 from rig.build.drawings.layout import EDGE_MM, PlacedView, arranged, views_of
 from rig.build.drawings.tables import Table, table_items, table_sheets
 from rig.build.mounts.plan import MountPlan
@@ -66,10 +75,12 @@ def view_sheets(plan: MountPlan, subject_mm: Floats | None = None) -> tuple[Shee
     views = arranged(everything.min(axis=0), everything.max(axis=0), sides)
     items: list[Item] = []
     named = _named(views, plan)
+    items += _dimensioned(views, plan, solids)
     for view in views:
         items += _drawn(view, plan, solids, subject_mm)
-        items += _cameras(view, plan, named=view in named)
-    items += _dimensioned(views, plan, solids)
+    written = [part for item in items for part in _parts(item)]
+    for view in views:
+        items += _cameras(view, plan, written, named=view in named)
     poses = Table("Cameras, optical centre from the datum", POSE_COLUMNS, _pose_rows(plan))
     tables = [poses, *_structure_tables(plan)]
     on_first = _in_corner(views, poses)
@@ -114,10 +125,21 @@ def _named(
     return (max(views, key=spread),)
 
 
-def _cameras(view: PlacedView, plan: MountPlan, *, named: bool) -> list[Item]:
-    """Marks at the optical centres, the optical axes, the names, and the datum's."""
+def _parts(item: Item) -> list[Item]:
+    return dimension_parts(item) if isinstance(item, Dimension) else [item]
+
+
+def _cameras(
+    view: PlacedView, plan: MountPlan, written: Sequence[Item], *, named: bool
+) -> list[Item]:
+    """Marks at the optical centres, the optical axes, the names, and the datum's.
+
+    ``written`` is what is on the sheet already: names keep off it where there is room.
+    """
     items: list[Item] = []
     labels, many = Labels(), len(plan.mounts) > MANY
+    # Where cameras crowd there is no room beside bars, and much to look at.
+    labels.keep_off_items([i for i in written if isinstance(i, Text)] if many else written)
     centres = view.paper(np.array([m.camera.pose.position_rig_mm for m in plan.mounts]))
     for mount, centre in zip(plan.mounts, centres, strict=True):
         corners = view.paper(np.concatenate(place_body(mount.camera).parts))

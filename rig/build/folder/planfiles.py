@@ -74,6 +74,7 @@ class _Making:
 
     def __init__(self, plan: MountPlan, options: PlanOptions) -> None:
         self.plan, self.options = plan, options
+        self.words: dict[str, str] = {}
         self._printed: dict[str, tuple[wedges.PrintPart, trimesh.Trimesh]] = {}
 
     @cached_property
@@ -127,7 +128,8 @@ class _Making:
         # Imported here: with plotly it costs a second that no other file needs.
         from rig.build.page.planpage import render_plan_page
 
-        return render_plan_page(self.plan, self.bill, self.cuts, self.options.occluder).encode()
+        page = render_plan_page(self.plan, self.bill, self.cuts, self.options.occluder, self.words)
+        return page.encode()
 
 
 def plan_files(plan: MountPlan, options: PlanOptions | None = None) -> dict[str, PlanFile]:
@@ -135,6 +137,7 @@ def plan_files(plan: MountPlan, options: PlanOptions | None = None) -> dict[str,
     making = _Making(plan, options or PlanOptions())
     files = [*_whole(making), *_lists(making), *_drawn(making), *_plates(making)]
     files += [*_setting_sheets(making), *_wedges(making)]
+    making.words |= {file.name: file.words for file in files}
     return {file.name: file for file in files}
 
 

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from importlib.resources import files
 from typing import Any
 
 from common.files.plain import number
 from common.page.document import drawn_page, style_sheet
 from common.page.html import element, esc, figure_text, long_words, percent, plot, section, table
+from common.words import of_limits
 from geometry.raycast import Occluder
 from rig.build.drawings.figures import POSE_COLUMNS, mm, pose_figures, setting_text
 from rig.build.drawings.steps import plain_steps
 from rig.build.drawings.views import plan_solids
-from rig.build.mounts.plan import MountPlan, set_for_weight
+from rig.build.mounts.plan import Figures, MountPlan, set_for_weight
 from rig.build.mounts.settings import CameraMount
+from rig.build.page.planlinks import files_section, shown_files
 from rig.build.page.planview import plan_figure
 from rig.build.page.stiffness import stiffness
 from rig.build.parts.bill import Bill
@@ -36,10 +39,15 @@ CONTENTS = (
 
 
 def render_plan_page(
-    plan: MountPlan, bill: Bill, cuts: tuple[Cut, ...], occluder: Occluder | None = None
+    plan: MountPlan,
+    bill: Bill,
+    cuts: tuple[Cut, ...],
+    occluder: Occluder | None = None,
+    files: Mapping[str, str] | None = None,
 ) -> str:
     """The page as one HTML document that needs no network.
 
+    ``files`` that lie beside the page, by name, with what they are: it links to them.
     Names may hold anything: they are escaped. ``document.body.dataset`` gets ``view``, a JSON
     summary of what is drawn, and ``ready`` once the figure stands.
     """
@@ -56,8 +64,8 @@ def render_plan_page(
     }
     return drawn_page(
         plan.name,
-        header=_heading(plan),
-        main=_main(plan, bill, cuts),
+        header=_heading(plan, shown_files(files or {})),
+        main=_main(plan, bill, cuts) + files_section(files or {}),
         footer="<p>Rig frame: millimetres, X to the subject's left, Y from the cameras towards "
         "the subject, Z up. σ is one standard deviation.</p>",
         style=style_sheet() + _part("plan.css"),
@@ -71,8 +79,9 @@ def _part(name: str) -> str:
     return files("rig.build.page").joinpath(name).read_text(encoding="utf-8")
 
 
-def _heading(plan: MountPlan) -> str:
+def _heading(plan: MountPlan, files: Mapping[str, str]) -> str:
     contents = [entry for entry in CONTENTS if plan.sags or entry[0] != "stiffness"]
+    contents += [("files", "Files")] if files else []
     words = f"Mount plan ({plan.system}) for {len(plan.mounts)} cameras"
     links = "".join(element("a", esc(name), href=f"#{key}") for key, name in contents)
     return f"<h1>{esc(plan.name)}</h1><p>{esc(words)}</p><nav>{links}</nav>"
@@ -147,7 +156,7 @@ def _tiles(plan: MountPlan, bill: Bill) -> str:
         ),
         _tile(
             "Mass", f"{bill.mass_g / 1000.0:.1f} <small>kg</small>",
-            _without(bill.without_mass, "mass"),
+            _without(bill.without_mass, "mass") + _taken(plan, bill),
         ),
         _tile(
             "Cost", cost,
@@ -163,6 +172,14 @@ def _without(parts: tuple[str, ...], what: str) -> str:
         return ""
     more = f" and {len(parts) - 1} more" if len(parts) > 1 else ""
     return f"no {what} is known of {parts[0]}{more}"
+
+
+def _taken(plan: MountPlan, bill: Bill) -> str:
+    """What all weighs with the masses that were taken where none is known."""
+    if not plan.stances or not bill.without_mass:
+        return ""
+    mass_kg = sum(stance.mass_kg for stance in plan.stances)
+    return f"; {mass_kg:.1f} kg with what is taken for it, as the notes say"
 
 
 def _structure() -> str:
@@ -187,7 +204,7 @@ def _accuracy(plan: MountPlan) -> str:
             figure_text(f.sigma_p95_mm),
             percent(f.coverage_2_views),
             percent(f.coverage_3_views),
-            "all hold" if f.feasible else long_words(", ".join(f.broken) or "broken"),
+            "all hold" if f.feasible else long_words(_broken(f)),
         )
         for name, f in stages
     ]
@@ -197,6 +214,12 @@ def _accuracy(plan: MountPlan) -> str:
         "rounded with the other settings optimised again after each."
     )
     return section("accuracy", "What rounding costs", words, table(head, rows))
+
+
+def _broken(figures: Figures) -> str:
+    if not figures.broken:
+        return "broken"
+    return f"{len(figures.broken)} broken: {of_limits(figures.broken)}"
 
 
 def _settings(plan: MountPlan) -> str:

@@ -13,7 +13,8 @@ WORDS = (
 )
 TIPPING = (
     "What stands by itself is to withstand a level push at the height of the head, a fifth of its "
-    "weight and 20 N at least. Below zero it would fall over by itself."
+    "weight and 20 N at least. Below zero it would fall over by itself. Its mass is with what was "
+    "taken where none is known, as the notes say."
 )
 TIPPING_HEAD = ("Feet", "Mass kg", "Tipped by N", "Towards", "Asked N")
 HEAD = (

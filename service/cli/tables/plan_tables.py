@@ -6,7 +6,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from common.words import percent_cut
+from common.words import of_limits, percent_cut
 from service.kinds.plan import PlanPrice, PlanResult
 
 
@@ -68,19 +68,23 @@ def _print_price(console: Console, price: PlanPrice) -> None:
         title="What building costs",
         title_justify="left",
     )
-    for label, row in (
+    stages = (
         ("as designed", price.designed),
         ("each setting rounded", price.rounded),
         ("re-optimised: as built", price.built),
-    ):
+    )
+    for label, row in stages:
         table.add_row(
             label,
             _figure(row.sigma_median_mm, 5),
             percent_cut(row.coverage_2_views),
             percent_cut(row.coverage_3_views),
-            "kept" if row.feasible else ", ".join(map(escape, row.broken[:3])),
+            "kept" if row.feasible else f"{len(row.broken) or 'some'} broken",
         )
     console.print(table)
+    for label, row in stages:
+        if row.broken:
+            console.print(f"broken {label}: {of_limits(row.broken)}", markup=False)
     console.print(
         f"loss of median sigma {_loss(price.sigma_loss)}, of coverage {_loss(price.coverage_loss)}"
     )

@@ -18,7 +18,8 @@ from drawn_pages import FIGURES, without_plotly
 from plans import plate_plan, tslot_plan
 
 from rig.build.drawings.views import plan_solids
-from rig.build.mounts.plan import Clash, MountPlan
+from rig.build.folder.planfiles import plan_files
+from rig.build.mounts.plan import Clash, MountPlan, Stance
 from rig.build.page.planpage import render_plan_page
 from rig.build.parts import Prices, bill_of_materials, cut_list
 from rig.catalogue import load_catalogue
@@ -104,6 +105,37 @@ def test_a_plan_that_cannot_be_built_says_so() -> None:
     broken = replace(plan.price.built, feasible=False, broken=("coverage",))
     soft = replace(plan, clashes=(), price=replace(plan.price, built=broken))
     assert "breaks limits" in page_of(soft)
+
+
+def test_limits_that_rounding_breaks_are_called_broken() -> None:
+    plan = tslot_plan(2)
+    rounded = replace(plan.price.rounded, feasible=False, broken=("scale/c1", "scale/c2"))
+    text = page_of(replace(plan, price=replace(plan.price, rounded=rounded)))
+    assert "2 broken: scale (c1, c2)" in text
+
+
+def test_both_masses_are_told_beside_each_other() -> None:
+    """The bill weighs what is known, the stance with what is taken for the rest."""
+    stance = Stance(("foot",), 16.3, np.zeros(3), 1200.0, 32.0, 40.0, "to the rear", np.ones(2))
+    plan = replace(tslot_plan(2), stances=(stance,))
+    assert bill_of_materials(plan, CATALOGUE).without_mass
+    assert "16.3 kg with what is taken for it" in page_of(plan)
+    assert "with what is taken for it" not in page_of(tslot_plan(2))
+
+
+def test_the_page_links_to_the_files_beside_it() -> None:
+    plan = tslot_plan(2)
+    files = {name: file.words for name, file in plan_files(plan).items()}
+    bill, cuts = bill_of_materials(plan, CATALOGUE), cut_list(plan, CATALOGUE)
+    elements = Elements()
+    elements.feed(without_plotly(render_plan_page(plan, bill, cuts, files=files)))
+    links = [a.get("href") or "" for tag, a in elements.found if tag == "a"]
+    beside = [link for link in links if not link.startswith("#")]
+    assert set(beside) <= set(files) and len(beside) == len(set(beside))
+    assert beside[0] == "steps.txt" and "#files" in links
+    assert {"settings/settings.pdf", "drawings/views.pdf", "parts/bill.csv"} <= set(beside)
+    page = plan_files(plan)["plan.html"].make().decode()
+    assert all(f'href="{link}"' in page for link in beside)
 
 
 @pytest.fixture(scope="module")
