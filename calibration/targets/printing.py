@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 from xml.sax.saxutils import escape
 
@@ -63,8 +64,8 @@ def page_size(page: str) -> tuple[float, float]:
     return (size[1], size[0]) if turned else size
 
 
-def carrier_drawings(kind: CarrierKind, page: str = "A4") -> tuple[Drawing, ...]:
-    """The pages of a carrier, drawn at its nominal size.
+def carrier_drawings(kind: CarrierKind, page: str = "A4", todo: str = "") -> tuple[Drawing, ...]:
+    """The pages of a carrier, drawn at its nominal size; ``todo`` stands at their foot.
 
     A carrier whose places are known is drawn as it is, on one page. Targets without places are
     laid out in rows on as many pages as they need. Raises :class:`InputError` when it does not
@@ -95,7 +96,9 @@ def carrier_drawings(kind: CarrierKind, page: str = "A4") -> tuple[Drawing, ...]
         spots = places[:, :2] + _centred(kind.name, low, high, width, height)
         numbers = [p.number for p in kind.places]
         return (_targets_page(kind, numbers, spots, width, height),)
-    return _rows(kind, reach, width, height)
+    pages = _rows(kind, reach, width, height)
+    at = MARGIN_MM, height - MARGIN_MM - _FOOT_MM + 3.0, _TEXT_MM
+    return tuple(replace(p, labels=(*p.labels, Label(*at, todo))) for p in pages) if todo else pages
 
 
 def to_pdf(drawings: Sequence[Drawing], title: str) -> bytes:

@@ -15,8 +15,6 @@ from calibration.targets.faces import carrier_face, has_face
 from calibration.targets.kinds import (
     CarrierKind,
     CharucoPlate,
-    MarkerCarrier,
-    RingCarrier,
     TargetPlace,
     TargetPlan,
 )
@@ -24,6 +22,9 @@ from calibration.targets.printing import carrier_drawings, to_pdf, to_svg
 from common.errors import InputError
 from service.kinds.defaults import PAGE
 from service.store.scans import plain_name
+
+PLACE_FIELDS = ("number", "x_rig_mm", "y_rig_mm", "z_rig_mm")
+PUT_UP = "Cut the targets out with their white, and stick each to the stand at its place in {}."
 
 
 @dataclass(frozen=True)
@@ -50,8 +51,9 @@ def sheets_of(plan: TargetPlan, page: str = PAGE) -> Mapping[str, Sheet]:
 
 
 def _printed(carrier: CarrierKind, page: str) -> list[Sheet]:
-    drawings = _drawn(_laid_out(carrier), page)
     stem = _stem(carrier)
+    todo = PUT_UP.format(f"{stem}-places.csv") if _stands_apart(carrier) else ""
+    drawings = _drawn(_laid_out(carrier), page, todo)
     many = len(drawings) > 1
     svgs = [
         Sheet(
@@ -68,35 +70,40 @@ def _printed(carrier: CarrierKind, page: str) -> list[Sheet]:
     return [pdf, *svgs]
 
 
-def _drawn(carrier: CarrierKind, page: str) -> tuple[Drawing, ...]:
+def _drawn(carrier: CarrierKind, page: str, todo: str) -> tuple[Drawing, ...]:
     """The pages of a carrier, turned where it does not fit upright."""
     try:
-        return carrier_drawings(carrier, page)
+        return carrier_drawings(carrier, page, todo)
     except InputError as error:
         if error.detail != "print-page" or page.endswith("landscape"):
             raise
-    return carrier_drawings(carrier, f"{page} landscape")
+    return carrier_drawings(carrier, f"{page} landscape", todo)
 
 
 def _laid_out(carrier: CarrierKind) -> CarrierKind:
     """A stand's targets one beside the other: they are cut out and put up at their places."""
-    if isinstance(carrier, CharucoPlate | Board) or not _stands(carrier):
+    if isinstance(carrier, CharucoPlate | Board) or not _stands_apart(carrier):
         return carrier
     return replace(carrier, places=tuple(TargetPlace(place.number) for place in carrier.places))
 
 
-def _stands(carrier: MarkerCarrier | RingCarrier) -> bool:
+def _stands_apart(carrier: CarrierKind) -> bool:
+    """Whether its targets do not lie in one plane: they are put up one by one."""
+    if isinstance(carrier, CharucoPlate | Board):
+        return False
     depth = np.array([place.position_mm[2] for place in carrier.places])
     return bool(np.isfinite(depth).all() and np.ptp(depth) > 1e-6)
 
 
 def _placed(carrier: CarrierKind) -> list[Sheet]:
     """Where the targets of a stand go, as a table."""
-    if isinstance(carrier, CharucoPlate | Board) or not _stands(carrier):
+    if isinstance(carrier, CharucoPlate | Board) or not _stands_apart(carrier):
         return []
     rows = [(place.number, *(f"{v:.1f}" for v in place.position_mm)) for place in carrier.places]
     text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows([("number", "x_mm", "y_mm", "z_mm"), *rows])
+    csv.writer(text, lineterminator="\n").writerows(
+        [("number", "x_rig_mm", "y_rig_mm", "z_rig_mm"), *rows]
+    )
     make = text.getvalue().encode
     return [Sheet(f"{_stem(carrier)}-places.csv", carrier.name, "text/csv", make)]
 
