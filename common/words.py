@@ -40,7 +40,7 @@ def of_limits(broken: Sequence[str], most: int = 6) -> str:
         kind, _, what = name.partition("/")
         groups.setdefault(kind, []).extend([what] if what else [])
     words = []
-    for kind, what in groups.items():
-        named = what if len(what) <= most else [*what[:most], f"{len(what) - most} more"]
+    for kind, ones in groups.items():
+        named = ones if len(ones) <= most else [*ones[:most], f"{len(ones) - most} more"]
         words.append(f"{kind} ({', '.join(named)})" if named else kind)
     return "; ".join(words)
