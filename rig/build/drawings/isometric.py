@@ -32,6 +32,7 @@ BEFORE = SheetView(
 BALLOON_MM = 3.6
 APART_MM = 9.0
 TABLE_MM = 128.0
+WITHOUT_BALLOON = "Screws, nuts and caps have a line and no balloon."
 COLUMNS = ("No.", "Part", "Count", "Length mm")
 
 
@@ -52,13 +53,15 @@ def isometric_sheets(plan: MountPlan, lines: Sequence[BillLine]) -> tuple[Sheet,
     top = A3_LANDSCAPE_MM[1] - MARGIN_MM - 6.0
     items.append(Text(view.view.title, MARGIN_MM + 5.0, top - 3.0, 2.6, bold=True))
     table = Table(
-        "Parts, numbered as in the bill; screws, nuts and caps have no balloon",
+        "Parts, numbered as in the bill",
         COLUMNS,
         tuple(_rows(lines)),
     )
     more: list[Content] = []
     if table.height_mm() <= top - (MARGIN_MM + BLOCK_MM[1] + 6.0):
-        items += table_items(table, A3_LANDSCAPE_MM[0] - MARGIN_MM - TABLE_MM, top, TABLE_MM - 5.0)
+        left = A3_LANDSCAPE_MM[0] - MARGIN_MM - TABLE_MM
+        items += table_items(table, left, top, TABLE_MM - 5.0)
+        items.append(Text(WITHOUT_BALLOON, left, top - table.height_mm() - 4.0, 2.0))
     else:
         more = table_sheets([table], "Parts", A3_LANDSCAPE_MM)
     # A projected scale would mislead whoever measures: lengths along the axes are 0.816 of it.

@@ -240,13 +240,12 @@ def _settings(plan: MountPlan) -> str:
         told = set_for_weight(s, sinking.get(mount.name))
         more = told.value - s.value
         slack = ""
-        if more:
-            slack = (
-                f" <small>{abs(more):g} {'more' if more > 0.0 else 'less'} for its weight</small>"
-            )
         if tolerance is not None:
             near = min(abs(tolerance.plus), abs(tolerance.minus))
-            slack += f" <small>({figure_text(near, 2)})</small>"
+            slack = f" <small>({figure_text(near, 2)})</small>"
+        if more:
+            way = "more" if more > 0.0 else "less"
+            slack += f"<br><small>{abs(more):g} {way} for its weight</small>"
         return f"{esc(s.name)} <b>{esc(setting_text(told))}</b>{unit}{slack}"
 
     most = max((len(m.settings) for m in plan.mounts), default=0)
