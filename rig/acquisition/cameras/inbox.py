@@ -80,7 +80,9 @@ class Inbox:
             try:
                 picture = {"pixels": _decode(told, payload)}
             except ValueError as error:
-                picture, status, notes["problem"] = {}, FrameStatus.INCOMPLETE, str(error)
+                # Of a frame that is not whole its transport knows better what is wrong.
+                notes.setdefault("problem", str(error))
+                picture, status = {}, FrameStatus.INCOMPLETE
         if status is FrameStatus.OK and self._is_late(told["arrived_host_ns"]):
             status = FrameStatus.LATE
         return Frame(

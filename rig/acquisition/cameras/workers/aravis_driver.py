@@ -23,6 +23,13 @@ CONTROL_REGISTER, CONTROL_BITS = 0x0A00, 0x3
 """Who controls a GigE Vision camera: exclusive access and control access."""
 KEPT_BUFFERS = 16
 PREVIEW_BUFFERS = 3
+LOSSES = {
+    Aravis.BufferStatus.MISSING_PACKETS: "packets of it did not arrive: look at the network, its "
+    "cables, packet size and packet delay",
+    Aravis.BufferStatus.TIMEOUT: "it stopped coming half-way: look at the cable and the network",
+    Aravis.BufferStatus.SIZE_MISMATCH: "it was larger than the camera had said",
+}
+"""What is said of a frame that its transport did not bring as a whole."""
 COUNTERS = (
     "n_completed_buffers",
     "n_failures",
@@ -233,13 +240,17 @@ class AravisDriver:
             "exposure_us": self._exposure_us,
             "metadata": {"transport": buffer.get_status().value_nick},
         }
+        if not whole:
+            header["metadata"]["problem"] = LOSSES.get(buffer.get_status(), "it did not come whole")
+        if not whole and not buffer.get_data():
+            return header, b""
         try:
             header["width"] = int(buffer.get_image_width())
             header["height"] = int(buffer.get_image_height())
             header["pixel_format"] = pfnc(buffer.get_image_pixel_format())
             return header, bytes(buffer.get_image_data())
         except (GLib.Error, TypeError, ValueError):
-            # A frame whose first packet is missing says neither its size nor its format.
+            # The library keeps nothing of some frames that are not whole, not even their size.
             return header, b""
 
     def preview(self, over: Callable[[], bool]) -> Optional[Picture]:  # noqa: UP045

@@ -235,6 +235,8 @@ class GenicamDriver:
             "device_ns": _timestamp_ns(buffer),
             "exposure_us": self._exposure_us,
         }
+        if not buffer.is_complete():
+            header["metadata"] = {"problem": "part of it did not arrive: look at cable and network"}
         components = buffer.payload.components
         if not components or components[0].data is None:
             return header, b""

@@ -84,6 +84,7 @@ def test_a_frame_with_packets_missing_is_incomplete() -> None:
     damaged = [frame for frame in frames if frame.status is FrameStatus.INCOMPLETE]
     assert len(damaged) >= 3
     assert "missing-packets" in {frame.metadata["transport"] for frame in damaged}
+    assert all("packets of it did not arrive" in frame.metadata["problem"] for frame in damaged)
     assert health.connected
     assert health.counters["incomplete_frames"] >= len(damaged)
 

@@ -204,9 +204,65 @@ def test_a_lag_nobody_expected_is_named_with_its_length() -> None:
 
 
 def test_shots_faster_than_the_lag_is_known_are_not_guessed() -> None:
-    result = pair(received(burst(), lag_tolerance_us=20_000.0))
+    result = pair(received(burst()[1:], lag_tolerance_us=20_000.0))
     assert not result.pairs
     assert kinds(result) == {FaultKind.AMBIGUOUS}
+    # A camera exposes in the order of its shots: with one each nothing is left to guess.
+    assert truths(pair(received(burst(), lag_tolerance_us=20_000.0))) == ALL_RIGHT
+
+
+def frozen(frames: Sequence[Frame], uncertain: frozenset[int] = frozenset({3})) -> CameraFrames:
+    """Five shots told over a bus: the third was told within 12 ms, the others at once."""
+    told = [
+        replace(at, uncertainty_us=6000.0 if at.shot in uncertain else 5.0)
+        for at in trigger_times(5, 4 * MS)
+    ]
+    return received(frames, trigger_times=tuple(told))
+
+
+def frozen_burst() -> list[Frame]:
+    lag_ns = round(LAG_US * 1000)
+    return [frame(START + k * 4 * MS + lag_ns, k + 1, k + 1) for k in range(5)]
+
+
+def test_a_command_that_took_long_costs_no_other_shot_its_picture() -> None:
+    frames = frozen_burst()
+    assert truths(pair(frozen(frames))) == {k: str(k) for k in range(1, 6)}
+    # Only shots between which its picture may lie are in doubt where one is lost.
+    result = pair(frozen([*frames[:2], *frames[3:]]))
+    assert truths(result) == {1: "1"}
+    assert {f.shot for f in result.faults if f.kind is FaultKind.AMBIGUOUS} == {2, 3, 4, 5}
+
+
+def test_a_clock_that_is_vague_for_one_picture_costs_no_other_its_shot() -> None:
+    class Vague(ShiftedClock):
+        def uncertainty_us(self, device_ns: int) -> float:
+            return 9000.0 if self.host_ns(device_ns) > START + 15 * MS else 20.0
+
+    result = pair(replace(frozen(frozen_burst()[:4], frozenset()), clock=Vague(CLOCK.offset_ns)))
+    assert truths(result) == {k: str(k) for k in range(1, 5)}
+    result = pair(replace(frozen(frozen_burst()[3:], frozenset()), clock=Vague(CLOCK.offset_ns)))
+    assert "5" not in truths(result).values()
+
+
+def test_a_frame_that_lost_its_packets_is_incomplete_and_says_why() -> None:
+    one, two, three = burst()
+    why = {"problem": "packets of it did not arrive"}
+    lost = replace(two, encoded=None, status=FrameStatus.INCOMPLETE, metadata=why)
+    result = pair(received([one, lost, three]))
+    assert truths(result) == {1: "1", 3: "3"}
+    (fault,) = result.faults
+    assert (fault.kind, fault.shot) == (FaultKind.INCOMPLETE, 2)
+    assert "lost on its way (packets of it did not arrive)" in fault.text
+
+
+def test_without_stamps_what_came_before_the_next_shot_is_certain() -> None:
+    frames = [replace(f, device_ns=None, counter=None) for f in burst(4)]
+    mute = {"capabilities": MUTE, "clock": None}
+    assert truths(pair(received(frames[:2], 4, **mute))) == {1: "1", 2: "2"}
+    result = pair(received([frames[0], *frames[2:]], 4, **mute))
+    assert truths(result) == {1: "1"}
+    assert "after shot 1 it cannot be told which shots lack theirs" in result.faults[0].text
 
 
 def test_a_counter_that_contradicts_the_stamps_gives_nothing() -> None:
