@@ -13,6 +13,9 @@ from rig.acquisition.capture.devices import DeviceMaker
 from rig.acquisition.station.spec import CameraPlan, Station
 from rig.acquisition.trigger.box import TriggerBox
 
+LARGEST_REMEDIES = 3
+"""More things to do at once than these nobody reads in one line."""
+
 
 class OpenCameras:
     """The cameras of a station that are open, by name, and why the others are not."""
@@ -21,6 +24,7 @@ class OpenCameras:
         self._plans = {camera.name: camera for camera in station.cameras}
         self._hands: dict[str, CameraThread] = {}
         self.problems: dict[str, str] = {}
+        self._remedies: dict[str, str] = {}
         self._backends: dict[str, CameraBackend] = {}
         try:
             for name in sorted({camera.backend for camera in station.cameras}):
@@ -52,6 +56,7 @@ class OpenCameras:
         try:
             return CameraThread(plan, self._backends[plan.backend].open(plan.id))
         except RigwrightError as error:
+            self._remedies[plan.name] = error.remedy
             return error.problem
 
     def require_some(self) -> None:
@@ -59,8 +64,13 @@ class OpenCameras:
         if not self._hands:
             told = "; ".join(f"{name}: {text}" for name, text in self.problems.items())
             raise DeviceError(
-                "camera-gone", f"no camera could be opened ({told})", "plug them in, then try again"
+                "camera-gone", f"no camera could be opened ({told})", self._what_to_do()
             )
+
+    def _what_to_do(self) -> str:
+        """What the errors say, each thing once; a station has many cameras of few kinds."""
+        different = list(dict.fromkeys(self._remedies[name] for name in self.problems))
+        return "; ".join(different[:LARGEST_REMEDIES])
 
     def threads(self, station: Station) -> tuple[CameraThread, ...]:
         """The open cameras in the station's order, with its present plans."""

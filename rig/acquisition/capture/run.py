@@ -11,7 +11,13 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from functools import partial
 
-from common.errors import CancelledError, DeviceError, InterlockError, RigwrightError
+from common.errors import (
+    CancelledError,
+    DeviceError,
+    InputError,
+    InterlockError,
+    RigwrightError,
+)
 from common.progress import CancelToken, Progress, ProgressCallback
 from rig.acquisition.cameras.base import ArmSpec, CameraDevice, CameraSettings
 from rig.acquisition.capture.camerathreads import CameraThread, do_all, outcomes
@@ -55,7 +61,8 @@ class CaptureRun:
         """Arm, fire and collect. :attr:`fate` says what is known of FIRE, also after an error.
 
         Raises :class:`DeviceError` ``camera-not-ready``, ``trigger-not-fired`` or what the
-        devices raise, :class:`InterlockError`, :class:`CancelledError`.
+        devices raise, :class:`InterlockError`, :class:`InputError` ``station-interlock``,
+        :class:`CancelledError`.
         """
         self._check_box()
         try:
@@ -88,10 +95,14 @@ class CaptureRun:
         if self.box is None or self.station.trigger is None:
             return
         closed = self.box.health().interlock_closed
-        required = self.station.trigger.interlock is Interlock.REQUIRED
-        if closed is False or (required and closed is None):
-            what = "is open" if closed is False else "is required, and the box has none"
-            raise InterlockError("open", f"the interlock {what}", "close it, then try again")
+        if closed is None and self.station.trigger.interlock is Interlock.REQUIRED:
+            raise InputError(
+                "station-interlock",
+                "the station requires an interlock, and its trigger box has none",
+                "use a box that has one, or leave 'interlock' out of [trigger]",
+            )
+        if closed is False:
+            raise InterlockError("open", "the interlock is open", "close it, then try again")
 
     def _arm_cameras(self) -> tuple[dict[str, Ready], tuple[Fault, ...]]:
         self.progress(Progress("arming cameras", 0.05))

@@ -13,7 +13,8 @@ def station_pulses(station: Station, cameras: tuple[CameraPlan, ...]) -> dict[in
     """The pulses that fire ``cameras``, the strobes and the LEDs, by output.
 
     Cameras that are not among ``cameras`` get no pulse: one that is not ready must not make a
-    stray exposure that turns up in the next capture.
+    stray exposure that turns up in the next capture. Where it shares its output with one that is
+    ready it is fired all the same; what it makes is dropped when it is armed next.
     """
     pulses: dict[int, Pulse] = {}
     for camera in cameras:

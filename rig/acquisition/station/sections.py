@@ -133,10 +133,14 @@ class StationCameraSection(StrictModel):
         description="Its serial number, or what `rigwright cameras` lists for it.",
     )
     output: Output | None = Field(
-        default=None, description="Output of the box that fires it. Without it: none."
+        default=None,
+        description="Output of the box that fires it. Without it: none. Cameras with equal "
+        "`delay_us` and `width_us` may share one.",
     )
     focus_output: Output | None = Field(
-        default=None, description="Output that half-presses its release."
+        default=None,
+        description="Output that half-presses its release. Cameras with equal `focus_lead_us`, "
+        "`delay_us` and `width_us` may share one.",
     )
     focus_lead_us: Microseconds = Field(
         default=0.0, description="How long before the shutter the focus line goes high."

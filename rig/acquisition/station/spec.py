@@ -188,25 +188,45 @@ def _devices_differ(cameras: tuple[CameraPlan, ...]) -> None:
             )
 
 
+@dataclass(frozen=True)
+class _Use:
+    """What an output does: ``timing`` is what its pulse is made of."""
+
+    user: str
+    job: str
+    timing: tuple[float, ...]
+
+
 def _outputs_differ(station: Station) -> None:
-    used: dict[int, str] = {}
-    for output, user in _outputs(station):
-        other = used.setdefault(output, user)
-        if other != user:
+    """Several cameras may hang on one output, by a line each, where one pulse fits them all."""
+    used: dict[int, _Use] = {}
+    for output, use in _outputs(station):
+        other = used.setdefault(output, use)
+        if other.job != use.job or (use.job == "light" and other is not use):
             raise InputError(
                 "value",
-                f"output {output} is used by {other} and by {user}",
-                "give each its own output",
+                f"output {output} is used by {other.user} and by {use.user}",
+                "give each its own output; only cameras may share one, for the same job",
+            )
+        if other.timing != use.timing:
+            raise InputError(
+                "value",
+                f"{other.user} and {use.user} share output {output}, and their pulses differ",
+                "give them equal delay_us, width_us and, for a focus line, focus_lead_us; or each "
+                "its own output",
             )
 
 
-def _outputs(station: Station) -> list[tuple[int, str]]:
+def _outputs(station: Station) -> list[tuple[int, _Use]]:
     found = []
     for camera in station.cameras:
+        name, pulse = f"camera {camera.name!r}", (camera.delay_us, camera.width_us)
         if camera.output is not None:
-            found.append((camera.output, f"camera {camera.name!r}"))
+            found.append((camera.output, _Use(name, "shutter", pulse)))
         if camera.focus_output is not None:
-            found.append((camera.focus_output, f"the focus of camera {camera.name!r}"))
-    found += [(light.output, f"strobe {k}") for k, light in enumerate(station.strobes, 1)]
-    found += [(light.output, f"LED {k}") for k, light in enumerate(station.leds, 1)]
+            use = _Use(f"the focus of {name}", "focus", (*pulse, camera.focus_lead_us))
+            found.append((camera.focus_output, use))
+    lights = [(f"strobe {k}", light) for k, light in enumerate(station.strobes, 1)]
+    lights += [(f"LED {k}", light) for k, light in enumerate(station.leds, 1)]
+    found += [(light.output, _Use(name, "light", ())) for name, light in lights]
     return found

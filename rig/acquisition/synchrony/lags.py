@@ -90,6 +90,9 @@ def _drift_us(lags: Sequence[float], known_us: float) -> float:
 def new_timings(station: Station, estimates: Mapping[str, LagEstimate]) -> dict[str, Timing]:
     """Delays under which all exposures' middles (or starts) coincide; the smallest one is 0.
 
+    Cameras that share an output share its delay: the middle of theirs is brought together with
+    the others, and what they differ by stays.
+
     Cameras on no output keep theirs. Raises :class:`InputError` when a camera on an output has
     no estimate, because the others would be moved away from it; and for a lag that it cannot
     have, or that drifts.
@@ -108,11 +111,21 @@ def new_timings(station: Station, estimates: Mapping[str, LagEstimate]) -> dict[
     # Middles can be brought together only where every exposure's length is known.
     middles = all(math.isfinite(estimates[camera.name].exposure_us) for camera in wired)
     late = {camera.name: _late_us(estimates[camera.name], middles) for camera in wired}
-    latest = max(late.values())
-    return {
-        name: Timing(latest - value, max(0.0, estimates[name].lag_us))
-        for name, value in late.items()
+    of_output = {
+        output: _middle([late[camera.name] for camera in wired if camera.output == output])
+        for output in {camera.output for camera in wired}
     }
+    latest = max(of_output.values())
+    return {
+        camera.name: Timing(
+            latest - of_output[camera.output], max(0.0, estimates[camera.name].lag_us)
+        )
+        for camera in wired
+    }
+
+
+def _middle(values: Sequence[float]) -> float:
+    return (min(values) + max(values)) / 2.0
 
 
 def _require_possible(camera: CameraPlan, estimate: LagEstimate) -> None:

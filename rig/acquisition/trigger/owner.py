@@ -26,6 +26,8 @@ _HOPELESS_S = 0.9
 """An order that waits for a lost box is given up when it has only this long left."""
 _SHORTEST_S = 0.3
 _LISTEN_S = 0.25
+_UNREACHED, _AGAIN = "the trigger box cannot be reached: ", "; it is looked for again by itself"
+_CABLE = "check its cable and power"
 
 
 class PortOwner:
@@ -50,6 +52,7 @@ class PortOwner:
         self._met = False
         self._probe_until_ns = 0
         self._backoff_s = BACKOFF_S[0]
+        self._remedy = _CABLE
         self._closing = threading.Event()
         self._thread = threading.Thread(target=self._run, name="trigger box", daemon=True)
 
@@ -102,7 +105,7 @@ class PortOwner:
         began = time.monotonic()
         try:
             self._connection.meet()
-            self._connection.view.problem = ""
+            self._connection.view.problem, self._remedy = "", _CABLE
             self._captures.met()
         except (NoAnswerError, RefusedError) as problem:
             if time.monotonic_ns() > self._probe_until_ns:
@@ -128,7 +131,8 @@ class PortOwner:
         if self._met:
             self._connection.metrics.count("reconnects")
         self._drop_line()
-        self._connection.view.problem = str(error)
+        self._connection.view.problem = error.problem.removeprefix(_UNREACHED)
+        self._remedy = error.remedy.removesuffix(_AGAIN)
         if self._fail_opening(error):
             self._closing.set()
             return
@@ -153,7 +157,7 @@ class PortOwner:
         until = time.monotonic() + seconds
         while not self._closing.is_set():
             problem = self._connection.view.problem or "the box is being looked for"
-            self._queue.fail_overdue(_gone(problem), _HOPELESS_S)
+            self._queue.fail_overdue(_gone(problem, self._remedy), _HOPELESS_S)
             left = until - time.monotonic()
             if left <= 0.0:
                 return
@@ -226,9 +230,5 @@ class PortOwner:
         self._connection.client.link.listen(min(max(patience_s, 0.0), _LISTEN_S))
 
 
-def _gone(problem: str) -> DeviceError:
-    return DeviceError(
-        "trigger-gone",
-        f"the trigger box cannot be reached: {problem}",
-        "check its cable and power; it is looked for again by itself",
-    )
+def _gone(problem: str, remedy: str = _CABLE) -> DeviceError:
+    return DeviceError("trigger-gone", f"{_UNREACHED}{problem}", f"{remedy}{_AGAIN}")

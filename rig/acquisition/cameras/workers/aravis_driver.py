@@ -232,16 +232,17 @@ class AravisDriver:
         if self._fired and device_ns:
             bracket = (self._fired.pop(0), device_ns, arrived_ns)
             self._brackets = [*self._brackets[-63:], bracket]
-        header = {
+        notes = {"transport": buffer.get_status().value_nick}
+        if not whole:
+            notes["problem"] = LOSSES.get(buffer.get_status(), "it did not come whole")
+        header: dict[str, Any] = {
             "arrived_host_ns": arrived_ns,
             "status": "ok" if whole else "incomplete",
             "counter": int(buffer.get_frame_id()),
             "device_ns": device_ns or None,
             "exposure_us": self._exposure_us,
-            "metadata": {"transport": buffer.get_status().value_nick},
+            "metadata": notes,
         }
-        if not whole:
-            header["metadata"]["problem"] = LOSSES.get(buffer.get_status(), "it did not come whole")
         if not whole and not buffer.get_data():
             return header, b""
         try:

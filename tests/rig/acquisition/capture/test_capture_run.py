@@ -157,22 +157,24 @@ def test_an_unplugged_camera_is_opened_again(bench: BenchMaker) -> None:
 @pytest.mark.parametrize(
     ("script", "policy", "refused"),
     [
-        (BoxScript(open_interlock=True), Interlock.IF_PRESENT, True),
-        (BoxScript(open_interlock=True), Interlock.REQUIRED, True),
-        (BoxScript(no_interlock=True), Interlock.REQUIRED, True),
-        (BoxScript(no_interlock=True), Interlock.IF_PRESENT, False),
+        (BoxScript(open_interlock=True), Interlock.IF_PRESENT, InterlockError),
+        (BoxScript(open_interlock=True), Interlock.REQUIRED, InterlockError),
+        (BoxScript(no_interlock=True), Interlock.REQUIRED, InputError),
+        (BoxScript(no_interlock=True), Interlock.IF_PRESENT, None),
     ],
 )
 def test_the_interlock(
-    bench: BenchMaker, script: BoxScript, policy: Interlock, refused: bool
+    bench: BenchMaker, script: BoxScript, policy: Interlock, refused: type[Exception] | None
 ) -> None:
     station = memory_station(trigger=TriggerPlan("rigwright", "memory:", interlock=policy))
     made = bench(station, box=script)
-    if not refused:
+    if refused is None:
         assert made.rig.capture(made.session, "smile").record.state == "complete"
         return
-    with pytest.raises(InterlockError):
+    with pytest.raises(refused) as caught:
         made.rig.capture(made.session, "smile")
+    # Nobody can close an interlock that is not there: then the station file is to be changed.
+    assert ("close it" in str(caught.value)) == script.open_interlock
     assert not made.box.fired and disarmed(made)
     assert made.session.committed("smile") is None
 
@@ -423,8 +425,9 @@ def test_a_box_that_is_gone_leaves_nothing_open(tmp_path: Path) -> None:
 def test_a_station_without_one_camera_is_refused(tmp_path: Path) -> None:
     scripts = {f"cam{k:02d}": CameraScript(not_ready="absent") for k in (1, 2, 3)}
     devices = MemoryDevices(scripts)
-    with pytest.raises(DeviceError, match="no camera could be opened"):
+    with pytest.raises(DeviceError, match="no camera could be opened") as caught:
         Rig(memory_station(), devices, locks=tmp_path, fit=line_fit)
+    assert caught.value.remedy == "plug it in", "what the backends say, and once"
     assert devices.closed and devices.box.closed
 
 

@@ -179,6 +179,24 @@ def test_two_things_cannot_be_one(key: str, value: object, problem: str) -> None
     assert problem in str(error.value)
 
 
+def test_cameras_may_share_an_output_whose_pulse_fits_them_all() -> None:
+    given_ = data()
+    first = given_["camera"][0]
+    given_["camera"] += [{**first, "name": f"cam{k:02d}", "id": f"SN{k}"} for k in range(11, 36)]
+    station = station_from_mapping(given_)
+    pulses = station_pulses(station, station.cameras)
+    assert pulses == station_pulses(station, station.cameras[:2])
+    for key in ("delay_us", "width_us", "focus_lead_us"):
+        changed = copy.deepcopy(given_)
+        changed["camera"][-1][key] = changed["camera"][-1].get(key, 0.0) + 7.0
+        with pytest.raises(InputError, match="and their pulses differ") as error:
+            station_from_mapping(changed)
+        assert "'cam35' share output" in error.value.problem
+    given_["strobe"] = [{"output": 13}, {"output": 13}]
+    with pytest.raises(InputError, match="output 13 is used by strobe 1 and by strobe 2"):
+        station_from_mapping(given_)
+
+
 def test_an_esper_box_starts_with_fire() -> None:
     for backend, lead_us in (("esper", 0.0), ("rigwright", 2000.0)):
         station = station_from_mapping({**data(), "trigger": {"url": "x", "backend": backend}})

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from common.errors import InputError
 from rig.acquisition.station.spec import CameraPlan, Station, TriggerPlan
-from rig.acquisition.synchrony.lags import LagEstimate, _estimate, new_timings
+from rig.acquisition.synchrony.lags import LagEstimate, _estimate, new_timings, with_new_timings
 
 CAMERA = CameraPlan("cam01", "simulated", "1", 1, expected_lag_us=60_000.0)
 
@@ -30,6 +32,24 @@ def test_a_lag_that_no_such_camera_has_is_not_written(lag_us: float) -> None:
     with pytest.raises(InputError, match="cam01 seems to expose") as caught:
         written(lag_us)
     assert caught.value.code == "input/lag-impossible"
+
+
+def test_cameras_on_one_output_get_one_delay() -> None:
+    """Lags of 50, 54 and 60 ms, the first two on one output: their middle meets the third."""
+    lags_us = {"cam01": 50_000.0, "cam02": 54_000.0, "cam03": 60_000.0}
+    cameras = tuple(
+        replace(CAMERA, name=name, id=name, output=2 if name == "cam03" else 1) for name in lags_us
+    )
+    station = Station("s", cameras, TriggerPlan("rigwright", "fake:"))
+    estimates = {name: replace(estimate(lag), camera=name) for name, lag in lags_us.items()}
+    timings = new_timings(station, estimates)
+    assert {name: found.delay_us for name, found in timings.items()} == {
+        "cam01": 8000.0,
+        "cam02": 8000.0,
+        "cam03": 0.0,
+    }
+    assert {name: found.expected_lag_us for name, found in timings.items()} == lags_us
+    with_new_timings(station, timings)
 
 
 def test_a_lag_that_drifts_is_told_and_not_written() -> None:

@@ -256,6 +256,7 @@ def test_another_box_on_the_path_after_replugging_is_never_fired(tmp_path: Path)
             with named_in_time(DeviceError, "device/trigger-gone"):
                 driver.fire("b")
             assert driver.health().state is not TriggerState.READY
+            assert "plug the right box in" not in driver.health().last_problem, "an error's remedy"
             assert not rises(two)
         assert rises(one) == ONE_EACH
 
