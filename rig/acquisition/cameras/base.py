@@ -79,6 +79,8 @@ class CameraCapabilities:
     """Names of the fields of :class:`CameraSettings` that it obeys."""
     by_files: bool = False
     """Whether its pictures are files of another program, which may be of any shot."""
+    fetched: bool = False
+    """Whether it keeps its pictures until it is asked for them."""
     wait_overrun_s: float = 0.0
     """How much longer than its timeout :meth:`CameraDevice.wait_frames` may take.
 

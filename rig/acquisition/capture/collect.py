@@ -23,6 +23,13 @@ CLOCK_READINGS = 8
 SLICE_S = 0.1
 """How often a camera that waits looks whether it is still wanted."""
 
+FETCH_INTERVAL_S = 1.0
+"""Shots nearer than this leave no time to fetch a picture between them."""
+FETCH_ROOM_S = 0.3
+"""How long before a shot no more is asked of a body."""
+FETCH_DELAY_S = 0.1
+"""A shot that is told so much too late was held up by fetching the picture before it."""
+
 
 @dataclass(frozen=True, eq=False)
 class Want:
@@ -61,11 +68,16 @@ class Command:
 
 @dataclass(frozen=True, eq=False)
 class Collected:
-    """What a camera gave. ``sent``: when it was told over its bus, shot by shot."""
+    """What a camera gave. ``sent``: when it was told over its bus, shot by shot.
+
+    ``asked_ns``: when it was asked for its pictures, on the host's clock; empty where they come
+    by themselves.
+    """
 
     frames: tuple[Frame, ...] = ()
     sent: tuple[Command, ...] = ()
     clock_samples: tuple[ClockSample, ...] = ()
+    asked_ns: tuple[int, ...] = ()
     problem: str = ""
 
 
@@ -105,6 +117,7 @@ class Collector:
         try:
             if self._device.capabilities.trigger is TriggerKind.SOFTWARE:
                 self._command()
+            self._ask()
             self._wait()
             self._keep(clock_samples=read_clock(self._device))
         except RigwrightError as error:
@@ -119,8 +132,12 @@ class Collector:
 
     def _command(self) -> None:
         want = self._want
+        fetches = want.interval_s >= FETCH_INTERVAL_S
         for k in range(want.shots):
             due = self._began + want.first_s + k * want.interval_s
+            if k and fetches:
+                self._fetch(k, due)
+                fetches = time.monotonic() - due < FETCH_DELAY_S
             if want.give_up.wait(max(0.0, due - time.monotonic())):
                 return
             before, problem = time.monotonic_ns(), ""
@@ -132,6 +149,19 @@ class Collector:
             command = Command(k + 1, HostInterval(before, time.monotonic_ns()), problem)
             self._keep(sent=(*self._got.sent, command))
             if problem and not self._device.health().connected:
+                return
+
+    def _ask(self) -> None:
+        if self._device.capabilities.fetched:
+            self._keep(asked_ns=(*self._got.asked_ns, time.monotonic_ns()))
+
+    def _fetch(self, count: int, due: float) -> None:
+        """Have the pictures made until now, so that they are not lost with what comes next."""
+        if not self._device.capabilities.fetched:
+            return
+        self._ask()
+        while (left := due - FETCH_ROOM_S - time.monotonic()) > 0.0:
+            if len(self._take(count, min(SLICE_S, left))) >= count or self._want.give_up.is_set():
                 return
 
     def _expected(self) -> int:

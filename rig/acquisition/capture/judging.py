@@ -138,6 +138,7 @@ def _part(
         lag_us=plan.expected_lag_us,
         lag_tolerance_us=plan.lag_tolerance_us,
         deadline_s=station.policy.frame_deadline_s,
+        asked_host_ns=got.asked_ns,
     )
     judged = _judged(_pair_if_shot(received), sizes.get(name))
     paired = _explained(_accounted(judged, shots), got.problem)

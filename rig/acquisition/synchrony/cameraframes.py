@@ -28,7 +28,8 @@ class CameraFrames:
     ``trigger_times``: when it was told to expose, in shot order, at least one. ``armed_host_ns``:
     when it was ready. ``clock`` is None where its time stamps cannot be related to the host's
     clock; ``clock_jumped`` where they could until its clock jumped. Lags are from trigger to
-    exposure; ``deadline_s`` from trigger to arrival.
+    exposure; ``deadline_s`` from trigger to arrival, and of a camera that keeps its pictures from
+    when it was first asked afterwards (``asked_host_ns``).
     """
 
     camera: str
@@ -41,6 +42,7 @@ class CameraFrames:
     lag_us: float = 0.0
     lag_tolerance_us: float = 20_000.0
     deadline_s: float = float("inf")
+    asked_host_ns: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -183,5 +183,6 @@ def _of_status(received: CameraFrames, one: Pair) -> list[Fault]:
 
 
 def _arrived_late(received: CameraFrames, one: Pair) -> bool:
-    trigger_time = next(i for i in received.trigger_times if i.shot == one.shot)
-    return one.frame.arrived_host_ns - trigger_time.at_host_ns > received.deadline_s * 1e9
+    at = next(i.at_host_ns for i in received.trigger_times if i.shot == one.shot)
+    since = next((asked for asked in received.asked_host_ns if asked >= at), at)
+    return one.frame.arrived_host_ns - since > received.deadline_s * 1e9

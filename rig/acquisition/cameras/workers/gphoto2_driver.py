@@ -142,6 +142,7 @@ class GphotoDriver:
             "trigger": self._options["trigger"],
             "timestamps": "none",
             "frame_counter": False,
+            "fetched": True,
             "settable": [field for field in WIDGETS if self._widget(field) is not None],
             "previews": bool(
                 self._camera.get_abilities().operations & gp.GP_OPERATION_CAPTURE_PREVIEW
@@ -230,7 +231,8 @@ class GphotoDriver:
         self._full_room = None
 
     def trigger(self) -> None:
-        """Release the shutter over USB."""
+        """Release the shutter over USB; files are asked for from the next :meth:`collect` on."""
+        self._collecting_since = None
         with _library():
             self._camera.trigger_capture()
 
