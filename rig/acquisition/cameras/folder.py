@@ -9,7 +9,9 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
+from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -37,6 +39,8 @@ from rig.acquisition.cameras.wholeness import MEDIA_TYPES
 from rig.acquisition.imaging import same_pixels
 
 POLL_S = 0.03
+OLD_S = 60.0
+"""A file last written so long before the camera was armed is of before; clocks of shares differ."""
 LONGEST_DOUBT_S = 3.0
 """How long a file with empty sectors must not have changed; less where the deadline is shorter."""
 
@@ -100,7 +104,7 @@ class FolderCamera:
         self._armed = False
         self._closed = False
         self._tells_time = False
-        self._spec = ArmSpec("", 1, 0.0)
+        self._spec, self._armed_at_s = ArmSpec("", 1, 0.0), 0.0
         self._counts: Counter[str] = Counter()
         self._known = self._look()
 
@@ -136,6 +140,9 @@ class FolderCamera:
         except OSError as error:
             raise self._gone(error) from None
         self._nodes = {path: stamp.node for path, stamp in files.items()}
+        for path, stamp in files.items():
+            with suppress(OSError):  # gone since
+                self._watch.glimpse(path, stamp)
         return {p: s if self._watch.whole(p, s) else None for p, s in files.items()}
 
     def _gone(self, error: OSError | None = None) -> DeviceError:
@@ -159,7 +166,7 @@ class FolderCamera:
             if stamp is not None and self._is_mine(path, stamp)
         )
         self._tells_time = self._told_time(present)
-        self._spec = spec
+        self._spec, self._armed_at_s = spec, time.time()
         self._known, self._frames, self._armed = present, [], True
         self._before = dict(present)
         self._unfinished_then = self._watch.unfinished(self._below)
@@ -268,6 +275,10 @@ class FolderCamera:
         doubts = {"known_as": known_as} if known_as else {}
         if self._tells_time and "DateTimeOriginal" not in tags:
             doubts["unlikely"] = "it tells no time"
+        written_s = stamp.modified_ns / 1e9
+        if "DateTimeOriginal" not in tags and written_s < self._armed_at_s - OLD_S:
+            at = datetime.fromtimestamp(written_s).astimezone()
+            doubts["last_written"] = at.isoformat(" ", "seconds")
         return Frame(
             camera_id=self._info.id,
             arrived_host_ns=time.monotonic_ns(),
@@ -298,9 +309,14 @@ class FolderCamera:
     def _copied(self, path: Path, stamp: Stamp, content: str) -> str:
         """The name of a file of before with the same bytes, empty when there is none."""
         for former, known in self._before.items():
-            if known is None or known.size != stamp.size or former == path:
+            if known is None or known.size != stamp.size:
                 continue
             try:
+                if former == path:
+                    # Touched, or written again as it was: what it held is only known by glimpse.
+                    if self._watch.glimpse(path, known) == self._watch.glimpse(path, stamp):
+                        return former.name
+                    continue
                 if self._watch.content(former, known) == content:
                     return former.name
             except OSError:  # gone since

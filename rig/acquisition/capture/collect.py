@@ -207,7 +207,7 @@ def wanted(frames: Sequence[Frame], want: Want, start_ns: int) -> int:
     seen: dict[str, set[tuple[int | None, ...]]] = {kind: set() for kind in want.kinds}
     for k, frame in enumerate(frames):
         stale = frame.arrived_host_ns < start_ns
-        stale |= not frame.metadata.keys().isdisjoint(("known_as", "unlikely"))
+        stale |= not frame.metadata.keys().isdisjoint(("known_as", "unlikely", "last_written"))
         if want.ready_stamp is not None and frame.device_ns is not None:
             stale |= frame.device_ns < want.ready_stamp
         if not stale:

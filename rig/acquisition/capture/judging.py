@@ -6,7 +6,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from common.errors import DeviceError
-from rig.acquisition.cameras.base import CameraCapabilities, ClockSample, TimestampKind, TriggerKind
+from rig.acquisition.cameras.base import (
+    CameraCapabilities,
+    ClockSample,
+    Frame,
+    TimestampKind,
+    TriggerKind,
+)
 from rig.acquisition.capture.camerathreads import CameraThread
 from rig.acquisition.capture.collect import Collected
 from rig.acquisition.capture.firing import Firing
@@ -169,10 +175,20 @@ def _by_files(
             pairing, raws = found[part.plan.name]
             faults = (*pairing.faults, *late_faults(part.received, pairing.pairs))
             judged = _judged(replace(pairing, faults=faults), sizes.get(part.plan.name))
-            problem = firing.collected[part.plan.name].problem
-            part = replace(part, pairing=_explained(judged, problem), raws=raws)
+            got = firing.collected[part.plan.name]
+            part = replace(
+                part,
+                pairing=_explained(judged, got.problem),
+                raws=raws,
+                unfiled=_unfiled(got.frames, pairing, raws),
+            )
         done.append(part)
     return tuple(done)
+
+
+def _unfiled(frames: Sequence[Frame], pairing: Pairing, raws: Pairing | None) -> tuple[Frame, ...]:
+    pairs = (*pairing.pairs, *(() if raws is None else raws.pairs))
+    return tuple(f for f in frames if all(f is not one.frame for one in pairs))
 
 
 def _delivery(station: Station, firing: Firing, part: CameraPart, wall_ns: int) -> FileDelivery:

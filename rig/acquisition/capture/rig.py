@@ -12,6 +12,7 @@ from common.closing import Closing
 from common.errors import ConflictError, InputError, RigwrightError
 from common.progress import CancelToken, NeverCancelled, Progress, ProgressCallback, ignore_progress
 from rig.acquisition.capture.devices import DeviceMaker
+from rig.acquisition.capture.filememory import recall
 from rig.acquisition.capture.firing import CaptureOrder, Fate
 from rig.acquisition.capture.judging import pair_and_judge
 from rig.acquisition.capture.liveview import LiveView
@@ -163,6 +164,7 @@ class Rig(Closing):
             require_same_rig(session.manifest, self.station, self._design)
             progress(Progress("checking", 0.0))
             session.require_space(self.station.policy.min_free_mb)
+            self._recall(session)
             stage = Stage(session, capture_id)
             name = box_name(session.manifest.session_id, capture_id)
             number = session.next_number
@@ -173,6 +175,13 @@ class Rig(Closing):
             record = self._commit(stage, captured, evidence, partial)
             progress(Progress("committed", 1.0))
             return CaptureResult(record, session.folder)
+
+    def _recall(self, session: Session) -> None:
+        """Learn from the session what another run of this rig learned of cameras' files."""
+        threads = self._cameras.threads(self.station)
+        names = [t.plan.name for t in threads if t.device.capabilities.by_files]
+        if names and not self._files.begun:
+            recall(self._files, self.station, session.index.records, names)
 
     def _commit(
         self, stage: Stage, captured: CaptureData, evidence: Evidence, partial: bool

@@ -61,6 +61,11 @@ def make_record(
         "faults": [*captured.all_faults, *more_faults],
         "cameras": [_camera(part, cameras[part.plan.name]) for part in captured.parts],
         "frames": [_frame(f, timings, numbering) for f in files],
+        "unfiled": [
+            {"camera": p.plan.name, "media_type": f.media_type, "metadata": dict(f.metadata)}
+            for p in captured.parts
+            for f in p.unfiled
+        ],
         "trigger": _trigger(captured, evidence),
         "timing": evidence.stamps.shots,
         "optical": evidence.optical,

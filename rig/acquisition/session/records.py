@@ -94,6 +94,14 @@ class FrameEntry(StrictModel):
     metadata: dict[str, str] = Field(description="What else the camera said.")
 
 
+class UnfiledEntry(StrictModel):
+    """A file that came during a capture and was not filed: what it tells is learned from."""
+
+    camera: str = Field(description="Name of the camera it came for.")
+    media_type: str = Field(description="What kind of file it is.")
+    metadata: dict[str, str] = Field(description="Its name, its checksum, what it says.")
+
+
 class CameraEntry(StrictModel):
     """One camera of a capture: what it was, what it was set to, how it timed."""
 
@@ -209,6 +217,10 @@ class CaptureRecord(StrictModel):
     faults: list[FaultEntry] = Field(description="Everything that went wrong.")
     cameras: list[CameraEntry] = Field(description="The cameras that took part.")
     frames: list[FrameEntry] = Field(description="The pictures.")
+    unfiled: list[UnfiledEntry] = Field(
+        default_factory=list,
+        description="Files that came for cameras seen only through files, and were not filed.",
+    )
     trigger: TriggerEntry | None = Field(description="The box's part; null: there was none.")
     timing: list[ShotEntry] = Field(description="The shots in time.")
     optical: OpticalEntry | None = Field(description="The timing board; null: not looked for.")

@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 
-from rig.acquisition.cameras.base import CameraInfo, CameraSettings, ClockSample
+from rig.acquisition.cameras.base import CameraInfo, CameraSettings, ClockSample, Frame
 from rig.acquisition.station.spec import CameraPlan
 from rig.acquisition.synchrony.cameraframes import CameraFrames, Pairing
 from rig.acquisition.synchrony.faults import Fault
@@ -26,6 +26,8 @@ class CameraPart:
     raws: Pairing | None = None
     """Raw files that came beside the pictures, paired by themselves."""
     clock_samples: tuple[ClockSample, ...] = ()
+    unfiled: tuple[Frame, ...] = ()
+    """Files that came and were given to no shot."""
 
     def without(self, shots: Collection[int | None]) -> CameraPart:
         """The same without the pictures of some shots."""

@@ -20,7 +20,7 @@ from rig.acquisition.synchrony.fileexposures import (
     Span,
     file_exposures,
 )
-from rig.acquisition.synchrony.filenumbers import FileNumbers, file_number
+from rig.acquisition.synchrony.filenumbers import FileNumbers
 
 SLACK_NS = SECOND_NS // 2
 """How far the time in a file may be from the start of its exposure beyond its last digit."""
@@ -52,6 +52,9 @@ class Clue:
 
     offset: Span
     shot: FiredShot
+    stepped: bool = False
+    """Whether all pictures before it had come, it was counted next, and its clock was known: it can
+    be of no earlier shot."""
 
 
 @dataclass
@@ -90,6 +93,39 @@ class FileEvidence:
     def __init__(self) -> None:
         self._cameras: dict[str, CameraFiles] = {}
         self._shots: list[FiredShot] = []
+        self._seen: dict[str, str] = {}
+
+    @property
+    def begun(self) -> bool:
+        """Whether anything was sorted or recalled yet."""
+        return bool(self._shots)
+
+    def recall(self, past: Sequence[tuple[FileDelivery, Sequence[Pair]]]) -> None:
+        """Learn from a capture that was sorted before: what was not filed, and what was."""
+        for given, filed in past:
+            memory, found = self._of(given.camera), dict[int, tuple[FileExposure, Method]]()
+            for shot in {pair.shot for pair in filed}:
+                pairs = [pair for pair in filed if pair.shot == shot]
+                (exposure, *_), _ = file_exposures([pair.frame for pair in pairs], 1)
+                found[shot] = (exposure, pairs[0].method)
+            contents = {pair.frame.metadata.get("sha256", "") for pair in filed}
+            left = [f for f in given.frames if f.metadata.get("sha256", "") not in contents]
+            mine = _own(given, memory.serial, {}, self._seen, [])
+            exposures, _ = file_exposures([f for f in mine if f in left], len(given.shots))
+            memory.tells_now = any(e.time is not None for e in exposures)
+            for exposure in exposures:
+                self._fits(given, memory, exposure, False, [])
+            self._learn(given, memory, found)
+            self._see((*given.frames, *(pair.frame for pair in filed)))
+        for given, _ in past[:1]:
+            self._shots += given.shots
+        del self._shots[:-REMEMBERED]
+
+    def _see(self, frames: Sequence[Frame]) -> None:
+        for frame in frames:
+            tags = frame.metadata
+            if tags.get("sha256"):
+                self._seen.setdefault(tags["sha256"], tags.get("file", "a file"))
 
     def sort(self, deliveries: Sequence[FileDelivery]) -> dict[str, tuple[Pairing, Pairing | None]]:
         """The pictures of each camera, and the raw files beside them."""
@@ -97,6 +133,8 @@ class FileEvidence:
         done = {one.camera: self._sorted(one, owners) for one in deliveries}
         for one in deliveries[:1]:
             self._shots += one.shots
+        for one in deliveries:
+            self._see(one.frames)
         del self._shots[:-REMEMBERED]
         return done
 
@@ -107,7 +145,7 @@ class FileEvidence:
         self, given: FileDelivery, owners: Mapping[str, frozenset[str]]
     ) -> tuple[Pairing, Pairing | None]:
         memory, faults = self._of(given.camera), list[Fault]()
-        frames = _own(given, memory, owners, faults)
+        frames = _own(given, memory.serial, owners, self._seen, faults)
         exposures, spare = file_exposures(frames, len(given.shots))
         for frame in spare:
             why = "a larger file of the same exposure is kept"
@@ -141,7 +179,8 @@ class FileEvidence:
         """The shots of this capture that a file may be of; none when it is held back."""
         if exposure.time is None and (memory.offset is not None or memory.tells_now):
             why = "it tells no time, and its camera's pictures do: a thumbnail, or another's file"
-            _hold(given, exposure, f"{why}; begin a new session if they no longer do", faults)
+            remedy = "let it write them, or begin a new session with the station opened anew"
+            _hold(given, exposure, f"{why}; {remedy}", faults)
             return []
         if exposure.time is None:
             return _untimed(given, memory, exposure, faults)
@@ -179,29 +218,37 @@ class FileEvidence:
         its shot's.
         """
         offsets = {shot: _offset(at, shot, given.wait_ns) for shot in given.shots}
-        agreed = [s for s, offset in offsets.items() if self._agrees(memory, s, offset)]
+        ahead = memory.numbers.ahead(exposure.name)
+        in_turn = len(given.shots) == 1 and ahead is not None and ahead == memory.outstanding + 1
+        agreed = [s for s, offset in offsets.items() if self._agrees(memory, s, offset, in_turn)]
         plain = memory.offset is None and not memory.outstanding and lone
         near = [s for s, offset in offsets.items() if plain and _is_plain(offset)]
         if agreed or near:
             return agreed or near
         shot, offset = next(iter(offsets.items()))
         seconds = (offset.low_ns + offset.high_ns) / 2e9
-        memory.clues = [*memory.clues[-3:], Clue(offset, shot)]
+        stepped = in_turn and memory.offset is not None and not memory.outstanding
+        memory.clues = [*memory.clues[-3:], Clue(offset, shot, stepped)]
         _hold(
             given,
             exposure,
             f"its time is {seconds:+.0f} s off the shot: another shot's picture, or a clock that "
-            "is not set; set the camera's clock, or take one more capture",
+            "is not set; set the camera's clock, or take one more capture in this session",
             faults,
         )
         return []
 
-    def _agrees(self, memory: CameraFiles, shot: FiredShot, offset: Span) -> bool:
-        """Whether an earlier picture was off by just as much, and not only as one come late."""
+    def _agrees(self, memory: CameraFiles, shot: FiredShot, offset: Span, in_turn: bool) -> bool:
+        """Whether an earlier picture was off by just as much, and not only as one come late.
+
+        ``in_turn``: by its number, one picture was made for each shot since the last that was
+        believed.
+        """
         for clue in memory.clues:
             if clue.shot.capture_id == shot.capture_id or offset.common(clue.offset) is None:
                 continue
-            if not self._shifted(shot, offset, clue) or _is_plain(offset):
+            stepped = clue.stepped and in_turn
+            if stepped or not self._shifted(shot, offset, clue) or _is_plain(offset):
                 return not self._came_late(memory, shot, offset)
         return False
 
@@ -243,7 +290,7 @@ class FileEvidence:
         if any(method is Method.ARRIVAL for _, method in found.values()):
             memory.outstanding = 0
         memory.outstanding += len(given.shots) - len(found)
-        memory.numbers.capture_ends([file_number(found[k][0].name) for k in sorted(found)])
+        memory.numbers.capture_ends([found[k][0].name for k in sorted(found)])
 
 
 def _offset(at: Span, shot: FiredShot, wait_ns: int) -> Span:
@@ -270,12 +317,12 @@ def _untimed(
     given: FileDelivery, memory: CameraFiles, exposure: FileExposure, faults: list[Fault]
 ) -> list[FiredShot]:
     """The shots that a file without a time may be of: its number must tell, or nothing lacks."""
-    number, shots = file_number(exposure.name), given.shots
-    ahead = memory.numbers.ahead(number)
+    name, shots = exposure.name, given.shots
+    ahead = memory.numbers.ahead(name)
     if ahead is not None and ahead <= 0:
         # What the capture before lacks is then the picture that was held back.
         explained = memory.outstanding <= (len(shots) if memory.numbers.may_begin_anew else 0)
-        if memory.numbers.begins_anew(number, len(shots)) and explained:
+        if memory.numbers.begins_anew(name, len(shots)) and explained:
             return list(shots)
         why = "its number is not above those of before; if the count began anew, take one more"
         _hold(given, exposure, f"{why} capture", faults)
@@ -289,7 +336,8 @@ def _untimed(
     _hold(
         given,
         exposure,
-        f"{why}; let the camera write times, or open the station anew when none is on its way",
+        f"{why}; let the camera write times, or begin a new session, with the station opened anew, "
+        "when none is on its way",
         faults,
     )
     return []
@@ -330,11 +378,16 @@ def _owners(
 
 def _own(
     given: FileDelivery,
-    memory: CameraFiles,
+    serial: str,
     owners: Mapping[str, frozenset[str]],
+    seen: Mapping[str, str],
     faults: list[Fault],
 ) -> list[Frame]:
-    """The frames without copies, and without what is of another body or from before the shot."""
+    """The frames without copies, and without what is of another body or from before the shot.
+
+    ``serial``: the camera's body, empty when it is not known; ``seen``: files of earlier captures
+    by their content.
+    """
     own: dict[str, Frame] = {}
     for number, frame in enumerate(given.frames):
         tags, lone = frame.metadata, FileExposure((frame,), None)
@@ -343,12 +396,15 @@ def _own(
         if content in own:
             text = f"{given.camera}: {lone.name} is the same file once more; it is kept once"
             faults.append(Fault(FaultKind.DUPLICATE, text, given.camera))
-        elif tags.get("known_as"):
-            _hold(given, lone, f"it is {tags['known_as']} once more", faults)
+        elif tags.get("known_as") or content in seen:
+            _hold(given, lone, f"it is {tags.get('known_as') or seen[content]} once more", faults)
+        elif tags.get("last_written"):
+            why = f"it tells no time, and was last written {tags['last_written']}: an old file"
+            _hold(given, lone, f"{why}; let the camera write times", faults)
         elif content in owners and given.camera not in owners[content]:
             _hold(given, lone, "the same file came for another camera", faults)
-        elif body and memory.serial and body != memory.serial:
-            _hold(given, lone, f"it is of the body {body}, not of {memory.serial}", faults)
+        elif body and serial and body != serial:
+            _hold(given, lone, f"it is of the body {body}, not of {serial}", faults)
         elif frame.arrived_host_ns < given.first_host_ns:
             text = f"{given.camera}: a picture that came before the first shot is left out"
             faults.append(Fault(FaultKind.EXTRA_AT_START, text, given.camera))

@@ -9,7 +9,7 @@ from datetime import datetime
 from pathlib import PurePath
 
 from rig.acquisition.cameras.base import Frame
-from rig.acquisition.synchrony.filenumbers import file_number
+from rig.acquisition.synchrony.filenumbers import file_numbers
 from rig.acquisition.synchrony.imagechecks import is_raw
 
 SECOND_NS = 1_000_000_000
@@ -89,9 +89,9 @@ def file_exposures(frames: Sequence[Frame], shots: int) -> tuple[list[FileExposu
             exposures += made
             spare += more
 
-    def order(e: FileExposure) -> tuple[int, int, int]:
+    def order(e: FileExposure) -> tuple[int, tuple[int, ...], int]:
         at = 0 if e.time is None else e.time.low_ns
-        return at, int(file_number(e.name) or 0), e.frames[0].arrived_host_ns
+        return at, file_numbers(e.name), e.frames[0].arrived_host_ns
 
     return sorted(exposures, key=order), spare
 

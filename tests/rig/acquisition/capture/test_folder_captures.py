@@ -270,6 +270,66 @@ def test_thumbnails_are_no_pictures(tethered: Tethered) -> None:
     assert "cam01: small.jpg is held back: it tells no time" in held(record)
 
 
+def test_a_run_of_its_own_goes_on_where_the_session_s_last_run_ended(tmp_path: Path) -> None:
+    """A clock never set is learned over two runs; a late picture of the run before is held."""
+    root, off = tmp_path / "tether", timedelta(days=-4000, seconds=433)
+
+    def run(number: int, deliver: Callable[[Tethered, datetime], None]) -> CaptureRecord:
+        with open_station(station(root), locks=tmp_path / "locks") as rig:
+            again = (tmp_path / "session").exists()
+            session = Session.open(tmp_path / "session") if again else None
+            with session or rig.new_session(tmp_path / "session") as session:
+                made = Tethered(rig, session, root)
+                made.seed = 10 * number
+                return made.capture(f"run{number}", lambda fired: deliver(made, fired))
+
+    def first(made: Tethered, fired: datetime) -> None:
+        made.write("cam01", "DSC_0001.JPG", fired + off)
+        made.write("cam02", "DSC_0001.JPG", fired)
+
+    def second(made: Tethered, fired: datetime) -> None:
+        made.write("cam01", "DSC_0002.JPG", fired + off)
+        made.write("cam02", "DSC_0002.JPG", fired)
+        made.write("cam03", "late.JPG", None)
+
+    assert run(1, first).missing == {"cam01": [1], "cam03": [1]}
+    # Nearer shots cannot be told apart where somebody else fires within the deadline.
+    time.sleep(1.5)
+    record = run(2, second)
+    assert record.missing == {"cam03": [1]}, record.faults
+    assert "cam03: late.JPG is held back: it tells no time, and an earlier picture" in held(record)
+
+
+def test_old_files_that_are_touched_or_put_there_are_no_pictures(tmp_path: Path) -> None:
+    root = tmp_path / "tether"
+    plan = station(root)
+    bytes_of_old = jpeg(None, 1)
+    touched = root / "cam01" / "portrait.JPG"
+    touched.write_bytes(bytes_of_old)
+    os.utime(touched, (1e9, 1e9))
+    with (
+        open_station(plan, locks=tmp_path / "locks") as rig,
+        rig.new_session(tmp_path / "session") as session,
+    ):
+        made = Tethered(rig, session, root)
+        made.seed = 10
+
+        def deliver(fired: datetime) -> None:
+            touched.write_bytes(bytes_of_old)
+            aside = tmp_path / "old.JPG"
+            aside.write_bytes(jpeg(None, 2))
+            os.utime(aside, (1e9, 1e9))
+            aside.rename(root / "cam02" / "old.JPG")
+            made.write("cam03", "DSC_0001.JPG", fired)
+
+        record = made.capture("one", deliver)
+    assert record.missing == {"cam01": [1], "cam02": [1]}
+    assert "cam01: portrait.JPG is held back: it is portrait.JPG once more" in held(record)
+    assert "cam02: old.JPG is held back: it tells no time, and was last written 2001" in held(
+        record
+    )
+
+
 def test_locks_go_by_folder_and_not_by_name(tmp_path: Path) -> None:
     one, other = station(tmp_path / "a"), station(tmp_path / "b")
     locks = tmp_path / "locks"

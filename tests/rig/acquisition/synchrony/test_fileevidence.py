@@ -185,6 +185,47 @@ def test_numbers_tell_where_no_time_does(
     assert untimed(FileEvidence(), *numbers) == [bool(one) for one in believed]
 
 
+@pytest.mark.parametrize(
+    ("names", "believed"),
+    [
+        (("0001_cam01.png", "0002_cam01.png", "0003_cam01.png"), (1, 1, 1)),
+        (("IMG0007-1080p.png", "IMG0008-1080p.png"), (1, 1)),
+        (("0001_cam2.png", "", "0003_cam2.png", "0004_cam2.png"), (1, 0, 1, 1)),
+        (("0001_cam2.png", "", "0002_cam2.png"), (1, 0, 0)),
+        (("ann_v2.png", "bob_v2.png"), (1, 1)),
+        (("DSC_0008.png", "DSC_0008-edited.png"), (1, 0)),
+    ],
+)
+def test_a_number_that_stays_does_not_count(
+    names: tuple[str, ...], believed: tuple[int, ...]
+) -> None:
+    evidence = FileEvidence()
+    got = [
+        len(
+            sorted_one(
+                evidence,
+                k,
+                NOON + timedelta(seconds=30 * k),
+                *([picture(name, None, str(k))] if name else []),
+            ).pairs
+        )
+        for k, name in enumerate(names)
+    ]
+    assert tuple(got) == believed
+
+
+@pytest.mark.parametrize("step_s", [3.0, -3.0, 60.0])
+def test_a_clock_that_is_set_in_mid_session_costs_one_picture(step_s: float) -> None:
+    """Also where the shots follow at so even a pace that a lag by one would look the same."""
+    evidence, got = FileEvidence(), []
+    for k in range(9):
+        at = NOON + timedelta(seconds=15 * k)
+        own = at + timedelta(seconds=step_s if k >= 3 else 0.0)
+        frame = picture(f"DSC_{k + 1:04d}.JPG", own, str(k), digits=2)
+        got.append(len(sorted_one(evidence, k, at, frame).pairs))
+    assert got == [1, 1, 1, 0, 1, 1, 1, 1, 1]
+
+
 def test_raw_files_come_beside_their_pictures_and_what_lacks_is_told() -> None:
     kinds = frozenset({"image/jpeg", "image/x-nikon-nef"})
     jpg = picture("D_1.JPG", NOON, "a")
