@@ -84,13 +84,19 @@ def look_at_rotation(
             "pose-degenerate", "a camera stands on the point it looks at", "move one of them"
         )
     forward = forward / distance
-    right = np.cross(forward, [0.0, 0.0, 1.0])
+    right = np.array([forward[1], 0.0 - forward[0], 0.0])
     length = float(np.linalg.norm(right))
     right = np.array([1.0, 0.0, 0.0]) if length < 1e-9 else right / length
-    down = np.cross(forward, right)
+    down = _cross(forward, right)
     roll = np.radians(roll_deg)
     x_axis = np.cos(roll) * right + np.sin(roll) * down
-    return np.stack([x_axis, np.cross(forward, x_axis), forward])
+    return np.array([x_axis, _cross(forward, x_axis), forward])
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    """Product of two vectors (3,): a search asks for thousands, and NumPy's is made for many."""
+    (a0, a1, a2), (b0, b1, b2) = a.tolist(), b.tolist()
+    return np.array([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0])
 
 
 def pan_tilt_roll_from_rotation(rotation_rig_to_camera: Floats) -> Floats:

@@ -16,9 +16,11 @@ from solver.quality import evaluate
 from solver.request import Request
 from solver.result import Quality
 from solver.search.built import Build, built_network, filtered, next_best_views
+from solver.search.candidates import Placed
 from solver.search.exchange import search_networks
 from solver.starts import kmeans_start, strips, turned
 from solver.strategy import Strategy
+from solver.workers import Workers
 
 _FINE = 2
 """How many networks of the search are optimised continuously."""
@@ -42,7 +44,7 @@ def unknown_to_search(limits: Limits) -> tuple[str, ...]:
     return tuple(name for name, limit in given.items() if limit is not None)
 
 
-def _searches(request: Request) -> bool:
+def searches(request: Request) -> bool:
     """Whether networks are searched: not about given poses, nor where it would help nothing."""
     if request.limits.matching.required and request.strategy is not Strategy.STRIP:
         # The classical starts know nothing of what can be matched.
@@ -55,7 +57,7 @@ def why_classical(request: Request, jobs: list[StartJob], scores: list[Quality])
     """Why given or classical starts are to be tried, "" where they are asked for; None if not."""
     unknown = ", ".join(unknown_to_search(request.limits))
     ignorant = f"the search does not know some of the limits ({unknown})"
-    if not _searches(request):
+    if not searches(request):
         asked = request.start is not None or request.strategy.classical
         return "" if asked else f"{ignorant}, so the classical starts were tried instead"
     tried = "so the classical starts were tried as well"
@@ -66,16 +68,19 @@ def why_classical(request: Request, jobs: list[StartJob], scores: list[Quality])
     return f"{ignorant}, {tried}" if unknown else None
 
 
-def searched(request: Request, cancel: CancelToken) -> list[StartJob]:
-    """The best networks of the search among candidates, unless poses to start from are given."""
-    if not _searches(request):
-        return []
+def searched(
+    request: Request, around: Placed, helpers: Workers, cancel: CancelToken
+) -> list[StartJob]:
+    """The best networks of the search among the candidates ``around`` the subject."""
     order = request.subject, request.camera, request.limits, request.names, request.fixed
     build = _BUILT.get(request.strategy)
     if build is None:
-        kind, found = Strategy.EXCHANGE, search_networks(*order, request.seed, cancel)
+        kind, found = (
+            Strategy.EXCHANGE,
+            search_networks(*order, request.seed, cancel, helpers, around),
+        )
     else:
-        kind, found = request.strategy, built_network(*order, build, cancel)
+        kind, found = request.strategy, built_network(*order, build, cancel, around)
     if cancel.is_set():
         raise CancelledError
     return [

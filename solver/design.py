@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -14,29 +14,32 @@ from geometry.arrays import Floats, Ints
 from geometry.camera import Camera, RigCamera
 from geometry.frames import Pose
 from geometry.subject import Subject
-from solver.beginnings import classical, searched, why_classical
+from solver.beginnings import classical, searched, searches, why_classical
 from solver.coverage.views import judge
 from solver.feasibility.contradictions import Hopeless, hopeless
 from solver.infeasibility import conflicts, missed
 from solver.limits import Limits
 from solver.outer_loop import StartResult
-from solver.pool import StartJob, run_all
+from solver.pool import StartJob
 from solver.problem import Problem, camera_at
 from solver.quality import evaluate
-from solver.refinement import optimality_error, refine
+from solver.refinement import HOPELESS_COST, optimality_error, refine
 from solver.request import Request
 from solver.result import NOBODY, Design, Quality, Relaxation, SolverReport, StartReport, Status
+from solver.search.bound import bound_of
+from solver.search.candidates import Placed, placed
 from solver.standing import check_angles, check_places
 from solver.starts import kmeans_start
 from solver.strategy import Strategy
+from solver.workers import Workers
 
 ENGINE = "sequential quadratic programming with exact second derivatives (PIQP)"
 _EXPECTED_OUTER_ITERATIONS = 8
 _SOLVED = 0.9
 """Fraction of the work at which all starts are solved."""
 
-_REFINEMENT_COST, _HOPELESS_COST = 1.01, 1.03
-"""A refinement may cost the first; beyond the second no more points are named to mend it."""
+_REFINEMENT_COST = 1.01
+"""A refinement may cost so much; beyond ``HOPELESS_COST`` no more points are named to mend it."""
 
 _REFINEMENT_TRIES = 3
 _MOST_NAMED = 100
@@ -52,8 +55,9 @@ def design(
     starts: int = 8,
     fixed: tuple[RigCamera, ...] = (),
     start: tuple[Pose, ...] | None = None,
-    workers: int = 1,
+    workers: int | Workers = 1,
     strategy: Strategy = Strategy.EXCHANGE,
+    bound: bool = False,
     progress: ProgressCallback = ignore_progress,
     cancel: CancelToken | None = None,
 ) -> Design:
@@ -62,10 +66,12 @@ def design(
     ``fixed`` cameras of an existing rig stay where they are and take part. ``start`` gives the
     poses of the first start, about which Eq 8 bounds the cameras. ``strategy`` says where starts
     come from otherwise; where it does not do alone, the report says why. The best feasible one
-    wins, worked on by ``workers`` processes; the result does not depend on their number. When the
-    limits contradict each other the nearest network is returned with status ``infeasible`` and the
-    conflicts named. Raises :class:`InputError` for orders that cannot be understood and
-    :class:`CancelledError` within a second of ``cancel`` being set.
+    wins, worked on by ``workers`` processes, or those that were begun before and end with the
+    search; the result does not depend on their number. With ``bound`` a design that holds its
+    limits says how good any other could be. When the limits contradict each other the nearest
+    network is returned with status ``infeasible`` and the conflicts named. Raises
+    :class:`InputError` for orders that cannot be understood and :class:`CancelledError` within a
+    second of ``cancel`` being set.
     """
     request = Request(subject, camera, limits, count, seed, starts, fixed, start, strategy)
     check_places(subject, fixed, limits)
@@ -75,24 +81,18 @@ def design(
     began = time.monotonic()
     tell = _Teller(progress)
     tell.stage("start", 0.0)
-    with threadpool_limits(1):
-        told = hopeless(subject, camera, limits, count + len(fixed))
-    if told is not None:
-        at_once = _told_at_once(request, told, began)
-        if not at_once.feasible:
-            tell.stage("done", 1.0)
-            return at_once
-    jobs = searched(request, token)
-    tell.expect(0, len(jobs))
-    results = run_all(jobs, workers, tell.step, token) if jobs else []
-    scores = _scores(jobs, results, token)
-    note = why_classical(request, jobs, scores)
-    if note is not None:
-        more = classical(request, len(jobs), token)
-        tell.expect(len(jobs), len(more))
-        others = run_all(more, workers, tell.step, token)
-        scores += _scores(more, others, token)
-        jobs, results = jobs + more, results + others
+    with Workers(workers) if isinstance(workers, int) else workers as helpers:
+        if searches(request):
+            helpers.begin()
+        with threadpool_limits(1):
+            told = hopeless(subject, camera, limits, count + len(fixed))
+        if told is not None:
+            at_once = _told_at_once(request, told, began)
+            if not at_once.feasible:
+                tell.stage("done", 1.0)
+                return at_once
+        solved = _solved(request, helpers, tell, token)
+    jobs, results, scores = solved.jobs, solved.results, solved.scores
     tell.stage("choose", _SOLVED)
     best = min(range(len(jobs)), key=lambda k: (*scores[k].rank, k))
     problem = jobs[best].problem
@@ -111,6 +111,9 @@ def design(
         found = conflicts(problem, values, token)
     if token.is_set():
         raise CancelledError
+    cameras = problem.placed(values)
+    around = solved.around
+    wanted = bound and quality.feasible
     report = SolverReport(
         engine=ENGINE,
         status=_status(quality, kkt),
@@ -122,20 +125,21 @@ def design(
         seconds=time.monotonic() - began,
         starts=tuple(_start_report(j, r, s) for j, r, s in zip(jobs, results, scores, strict=True)),
         conflicts=found,
-        starts_note=note or "",
+        starts_note=solved.note,
+        bound=bound_of(subject, camera, limits, cameras, token, around) if wanted else None,
     )
     tell.stage("done", 1.0)
-    return Design(problem.placed(values), quality, problem.cameras, begin, limits, report)
+    return Design(cameras, quality, problem.cameras, begin, limits, report)
 
 
 def _told_at_once(request: Request, told: Hopeless, began: float) -> Design:
     """A first network, where no network can hold the limits: given or k-means, not optimised."""
     subject, camera, names = request.subject, request.camera, request.names
-    placed = kmeans_start(subject, camera, request.limits, names, request.seed)
+    cameras = kmeans_start(subject, camera, request.limits, names, request.seed)
     if request.start is not None:
         poses = zip(names, request.start, strict=True)
-        placed = tuple(camera_at(camera, name, pose, request.target_mm) for name, pose in poses)
-    problem = request.problem(placed)
+        cameras = tuple(camera_at(camera, name, pose, request.target_mm) for name, pose in poses)
+    problem = request.problem(cameras)
     quality = evaluate(subject, problem.cameras, request.limits, problem.anchor)
     report = SolverReport(
         engine=NOBODY,
@@ -151,6 +155,41 @@ def _told_at_once(request: Request, told: Hopeless, began: float) -> Design:
         contradiction=str(told),
     )
     return Design(problem.cameras, quality, problem.cameras, quality, request.limits, report)
+
+
+@dataclass(frozen=True, eq=False)
+class _Solved:
+    """All starts, what came of each and how it is judged.
+
+    ``note`` why classical starts are among them although others were asked for; ``around`` where
+    the search looked, None if nothing was searched.
+    """
+
+    jobs: list[StartJob]
+    results: list[StartResult]
+    scores: list[Quality]
+    note: str
+    around: Placed | None
+
+
+def _solved(request: Request, helpers: Workers, tell: _Teller, cancel: CancelToken) -> _Solved:
+    """The starts that the strategy makes, and classical ones where it does not do alone."""
+    around, jobs = None, []
+    if searches(request):
+        subject, camera, limits = request.subject, request.camera, request.limits
+        around = placed(subject, camera, limits, cancel, workers=helpers)
+        jobs = searched(request, around, helpers, cancel)
+    tell.expect(0, len(jobs))
+    results = helpers.run(jobs, tell.step, cancel)
+    scores = _scores(jobs, results, cancel)
+    note = why_classical(request, jobs, scores)
+    if note is not None:
+        more = classical(request, len(jobs), cancel)
+        tell.expect(len(jobs), len(more))
+        others = helpers.run(more, tell.step, cancel)
+        scores += _scores(more, others, cancel)
+        jobs, results = jobs + more, results + others
+    return _Solved(jobs, results, scores, note or "", around)
 
 
 class _Teller:
@@ -210,7 +249,7 @@ def _finish(
         if worth or refined.rank < quality.rank:
             return outcome.values, refined, outcome.kkt_error, outcome.why, outcome.iterations
         why = f"{result.why}; the last digits with each view held cost more than they give"
-        if refined.feasible and refined.cost_mm2 > _HOPELESS_COST * quality.cost_mm2:
+        if quality.feasible and refined.cost_mm2 > HOPELESS_COST * quality.cost_mm2:
             break
         judged = judge(problem, problem.unknowns.state(outcome.values))
         result = replace(

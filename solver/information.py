@@ -44,7 +44,7 @@ def covariance_norms(entries: Floats) -> Floats:
     3 x 3 inverses at a time have no use for pivots. The root loses no digits, for its argument is
     at least a third of the square of the sum of the principal minors.
     """
-    xx, yy, zz, xy, xz, yz = np.moveaxis(entries, -2, 0)
+    xx, yy, zz, xy, xz, yz = (entries[..., k, :] for k in range(6))
     xy2, xz2, minor = xy * xy, xz * xz, yy * zz
     minor -= yz * yz
     determinant = xx * minor

@@ -46,9 +46,10 @@ from solver.formulation import (
 from solver.information import CovarianceCost, loss_by_one_view
 from solver.nlp.program import NonlinearProgram
 from solver.nlp.sqp import Outcome, minimise
-from solver.outer_loop import Monitor, Report, StartResult
+from solver.outer_loop import Monitor, StartResult
 from solver.problem import Problem
 from solver.variables import FOCUS, PER_CAMERA
+from solver.workers import Report
 
 FIRST_BOX = 0.06
 """Half the box of the first move, in length scales and radians: about 3 degrees."""

@@ -8,7 +8,6 @@ work on a thinned set of points; the last ones on all.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -41,9 +40,7 @@ from solver.formulation import (
 from solver.nlp.program import NonlinearProgram
 from solver.nlp.sqp import FIRST_RADIUS, Outcome, minimise
 from solver.problem import Problem
-
-Report = Callable[[int, int, float, float], None]
-"""Called with outer iteration, iteration, cost relative to the start's, violation."""
+from solver.workers import Report
 
 MAX_OUTER_ITERATIONS = 12
 MAX_CUT_PASSES = 4

@@ -29,10 +29,15 @@ _GAIN, _ROUGH_GAIN = 1e-13, 1e-5
 """Of three steps, at which a pass ends: what another pass will change needs no last digits."""
 
 
+HOPELESS_COST = 1.03
+"""Whose cost grows by more while points that came into view are framed ends nowhere better."""
+
+
 def refine(problem: Problem, result: StartResult, cancel: CancelToken) -> Outcome:
     """Solve to the optimality conditions from where a start ended, with the same assignment.
 
-    What goes hidden or comes into view on the way is held on to in another pass.
+    What goes hidden or comes into view on the way is held on to in another pass, as long as that
+    costs no more than :data:`HOPELESS_COST` of what it began with.
     """
     with threadpool_limits(1):
         problem, values = with_points(problem, result.added_points), result.values
@@ -52,7 +57,7 @@ def refine(problem: Problem, result: StartResult, cancel: CancelToken) -> Outcom
             lost = cuts_for_hidden(problem, after, seen.assigned, opening)
             entered = _entered(problem, found, seen, result)
             clean = len(lost.camera) == 0 and entered is None
-            if outcome.stopped or (clean and not rough):
+            if outcome.stopped or (clean and not rough) or _hopeless(program, result, outcome):
                 break
             rough = rough and not clean
             cuts = cuts.joined(lost)
@@ -81,6 +86,13 @@ def _pass(
         max_iterations=_MAX_ROUGH_STEPS if rough else most_steps,
         radius=_RADIUS,
     )
+
+
+def _hopeless(program: NonlinearProgram, result: StartResult, outcome: Outcome) -> bool:
+    """Whether a network that held its limits is made to hold others at too high a price."""
+    before, after = (program.unknowns.state(v) for v in (result.values, outcome.values))
+    dearer = program.cost.value(after) > HOPELESS_COST * program.cost.value(before)
+    return dearer and result.merit.feasible
 
 
 def optimality_error(problem: Problem, result: StartResult) -> float:

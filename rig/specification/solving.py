@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from common.progress import CancelToken, ProgressCallback, ignore_progress
 from geometry.subject import Subject
 from rig.specification.spec import RigSpec
 from solver.design import design
 from solver.result import Design
-from solver.search.bound import bound_of
 from solver.standing import as_it_stands
+from solver.workers import Workers
 
 
 def solved(
     subject: Subject,
     spec: RigSpec,
     *,
-    workers: int = 1,
+    workers: int | Workers = 1,
     bound: bool = False,
     progress: ProgressCallback = ignore_progress,
     cancel: CancelToken | None = None,
@@ -29,7 +27,7 @@ def solved(
     """
     if spec.count == 0:
         return as_it_stands(subject, spec.fixed, spec.limits, spec.seed)
-    made = design(
+    return design(
         subject,
         spec.camera,
         spec.limits,
@@ -40,10 +38,7 @@ def solved(
         start=spec.start or None,
         strategy=spec.strategy,
         workers=workers,
+        bound=bound,
         progress=progress,
         cancel=cancel,
     )
-    if not bound or not made.feasible:
-        return made
-    found = bound_of(subject, spec.camera, spec.limits, made.cameras, cancel)
-    return replace(made, solver=replace(made.solver, bound=found))

@@ -29,6 +29,7 @@ from service.tasks.reading import notes_of
 from solver.quality import evaluate
 from solver.result import Design, Quality
 from solver.standing import check_places
+from solver.workers import Workers
 
 _READING = 0.02
 _DESIGNING = 0.96
@@ -78,15 +79,18 @@ def _designed(
 ) -> DesignResult:
     """Read, design, lay out, write."""
     running.report(Progress("reading the scan", 0.0))
-    prepared = prepare_subject(read_scan(scan, spec.scan_options), spec.subject_options)
-    made = solved(
-        prepared.subject,
-        spec,
-        workers=workers,
-        bound=True,
-        progress=within(running.report, _READING, _DESIGNING),
-        cancel=running.cancel,
-    )
+    with Workers(workers) as helpers:
+        if spec.count:
+            helpers.begin()
+        prepared = prepare_subject(read_scan(scan, spec.scan_options), spec.subject_options)
+        made = solved(
+            prepared.subject,
+            spec,
+            workers=helpers,
+            bound=True,
+            progress=within(running.report, _READING, _DESIGNING),
+            cancel=running.cancel,
+        )
     running.report(Progress("writing the files", _DESIGNING))
     layout = make_layout(made.cameras, prepared.subject, spec.limits)
     write_design_folder(folder, made, layout, prepared, spec, scan_name)

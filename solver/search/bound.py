@@ -17,7 +17,7 @@ from geometry.camera import Camera, RigCamera
 from geometry.subject import Subject
 from solver.limits import Limits
 from solver.result import Bound
-from solver.search.candidates import Candidates, candidates
+from solver.search.candidates import Candidates, Placed, candidates, placed
 
 _TWICE = 2
 _STEPS = 400
@@ -34,17 +34,19 @@ def bound_of(
     limits: Limits,
     cameras: tuple[RigCamera, ...],
     cancel: CancelToken | None = None,
+    around: Placed | None = None,
 ) -> Bound | None:
     """How far a network of ``cameras`` may be from the best of candidates around the subject.
 
-    Candidates stand as in the search, 6 degrees apart; the network's own cameras that are not
-    fixed are candidates too, so that nothing is said of less than the design itself. None where
-    nobody else may stand. Raises :class:`CancelledError` soon after ``cancel`` is set.
+    Candidates stand as in the search, 6 degrees apart (``around``, where that is known); the
+    network's own cameras that are not fixed are candidates too, so that nothing is said of less
+    than the design itself. None where nobody else may stand. Raises :class:`CancelledError` soon
+    after ``cancel`` is set.
     """
     free = tuple(c for c in cameras if not c.fixed)
     given = (*(c for c in cameras if c.fixed), *free)
     with threadpool_limits(1):
-        pool = candidates(subject, camera, limits, given, cancel)
+        pool = candidates(subject, limits, around or placed(subject, camera, limits, cancel), given)
         if not pool.free:
             return None
         network = np.arange(pool.free, len(pool))

@@ -13,7 +13,7 @@ from geometry.arrays import Ints
 from geometry.camera import Camera, RigCamera
 from geometry.subject import Subject
 from solver.limits import Limits
-from solver.search.candidates import candidates
+from solver.search.candidates import Placed, candidates, placed
 from solver.search.networks import Search
 
 Build = Callable[[Search, int, CancelToken], Ints]
@@ -27,13 +27,16 @@ def built_network(
     fixed: tuple[RigCamera, ...],
     build: Build,
     cancel: CancelToken,
+    around: Placed | None = None,
 ) -> list[tuple[RigCamera, ...]]:
     """The one network of new cameras called ``names`` that ``build`` makes of the candidates.
 
-    None where it would break a rule about pairs of cameras.
+    They are those ``around`` the subject, which stand 6 degrees apart without it. None where the
+    network would break a rule about pairs of cameras.
     """
     with threadpool_limits(1):
-        pool = candidates(subject, camera, limits, fixed, cancel)
+        around = around or placed(subject, camera, limits, cancel)
+        pool = candidates(subject, limits, around, fixed)
         if pool.free < len(names):
             return []
         search = Search(pool, limits)

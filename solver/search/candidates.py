@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from solver.motion import visibility_positions
 from solver.problem import Problem, camera_at
 from solver.search.matches import Matches
 from solver.starts import better_roll
+from solver.workers import Report, Workers, silent
 
 STEP_DEG = 6.0
 """Angle between neighbouring candidate directions: finer ones are left to the continuous solve."""
@@ -119,52 +121,110 @@ def directions_about(centres: Floats, step_deg: float) -> Floats:
     return np.array(out)
 
 
-def candidates(
+@dataclass(frozen=True, eq=False)
+class _Placing:
+    """Cameras to be placed in the directions ``outward`` (m, 3); see :func:`placed`.
+
+    The result is the camera of each direction that sees enough, and how many of them see each check
+    point (p,) from a usual distance. ``closely``: what they see is looked at again from where they
+    stand, so that a solve begins inside the limits.
+    """
+
+    index: int
+    subject: Subject
+    camera: Camera
+    limits: Limits
+    outward: Floats
+    closely: bool
+
+    def run(self, _report: Report, cancel: CancelToken) -> tuple[list[RigCamera], Ints]:
+        """See :class:`solver.workers.Job`."""
+        points = self.subject.check_points
+        guess = self._usual_distance_mm()
+        found: list[RigCamera] = []
+        often = np.zeros(len(points), dtype=np.int64)
+        for direction in self.outward:
+            if cancel.is_set():
+                raise CancelledError
+            sees = self._sight(guess * direction + self._middle)
+            if sees.sum() < _LEAST_SEEN:
+                continue
+            often += sees
+            pose = self._pose(sees, direction)
+            if self.closely:
+                sees |= self._sight(pose.position_rig_mm)
+                pose = self._pose(sees, direction)
+            found.append(camera_at(self.camera, "candidate", pose, points.points_mm[sees]))
+        return found, often
+
+    @cached_property
+    def _middle(self) -> Floats:
+        return self.subject.design_points.centroid_mm
+
+    def _usual_distance_mm(self) -> float:
+        stand_off, radius = self.limits.stand_off, self.subject.design_points.radius_mm
+        return min(stand_off.max_mm or 10.0 * radius, max(stand_off.min_mm or 0.0, 6.0 * radius))
+
+    def _sight(self, eye_mm: Floats) -> Bools:
+        # A little beyond the limit of incidence: what a short move would bring into view.
+        points, eyes = self.subject.check_points, eye_mm[None]
+        return np.asarray(_sight(points, self.subject, self.limits, eyes, NEAR.framed_deg)[0])
+
+    def _pose(self, sees: Bools, away: Floats) -> Pose:
+        seen_mm = self.subject.check_points.points_mm[sees]
+        roll, nearest = better_roll(self.camera, self.limits, seen_mm, -away, self._middle)
+        low = self.limits.stand_off.min_mm or 0.0
+        high = self.limits.stand_off.max_mm or np.inf
+        distance = float(np.clip(_ROOM * nearest, low, high))
+        return Pose(self._middle + distance * away, look_at_rotation(np.zeros(3), -away, roll))
+
+
+@dataclass(frozen=True, eq=False)
+class Placed:
+    """Cameras that could stand somewhere, and how many see each check point (p,) from there."""
+
+    cameras: tuple[RigCamera, ...]
+    often: Ints
+
+
+def placed(
     subject: Subject,
     camera: Camera,
     limits: Limits,
-    fixed: tuple[RigCamera, ...] = (),
     cancel: CancelToken | None = None,
     step_deg: float = STEP_DEG,
     outward: Floats | None = None,
-) -> Candidates:
+    workers: Workers | None = None,
+) -> Placed:
     """Cameras around the subject, each as near as frame and focus allow for what it sees.
 
     They stand ``step_deg`` apart all around it, or in the directions ``outward`` (m, 3). They aim
     at the centroid, level or upright, whichever lets them stand closer. Those that a zone
-    forbids are left out. Raises :class:`CancelledError` soon after ``cancel`` is set.
+    forbids are left out. ``workers`` share the work, and do not change what comes of it. Raises
+    :class:`CancelledError` soon after ``cancel`` is set.
     """
-    middle = subject.design_points.centroid_mm
+    workers = workers or Workers()
     closely = outward is not None
     if outward is None:
         outward = directions(_facing(subject), step_deg)
-    far = limits.stand_off.max_mm or 10.0 * subject.design_points.radius_mm
-    guess = min(far, max(limits.stand_off.min_mm or 0.0, 6.0 * subject.design_points.radius_mm))
-    token = cancel or NeverCancelled()
-    found: list[RigCamera] = []
-    often = np.zeros(len(subject.check_points), dtype=np.int64)
-    for direction in outward:
-        if token.is_set():
-            raise CancelledError
-        # A little beyond the limit of incidence: what a short move would bring into view.
-        eye = (middle + guess * direction)[None]
-        sees = _sight(subject.check_points, subject, limits, eye, NEAR.framed_deg)[0]
-        if sees.sum() < _LEAST_SEEN:
-            continue
-        often += sees
-        seen_mm = subject.check_points.points_mm[sees]
-        pose = _pose(camera, limits, seen_mm, direction, middle)
-        if closely:
-            # From another distance other points are seen; a solve is to begin inside the limits.
-            eye = pose.position_rig_mm[None]
-            sees |= _sight(subject.check_points, subject, limits, eye, NEAR.framed_deg)[0]
-            seen_mm = subject.check_points.points_mm[sees]
-            pose = _pose(camera, limits, seen_mm, direction, middle)
-        found.append(camera_at(camera, f"at{len(found)}", pose, seen_mm))
-    found = _where_allowed(subject, limits, found)
-    chosen, share = _weighed_points(often)
+    jobs = [
+        _Placing(k, subject, camera, limits, part, closely)
+        for k, part in enumerate(np.array_split(outward, workers.count))
+    ]
+    found = workers.run(jobs, silent, cancel or NeverCancelled())
+    cameras = _where_allowed(subject, limits, [c for some, _ in found for c in some])
+    cameras = [replace(c, name=f"at{k}") for k, c in enumerate(cameras)]
+    return Placed(tuple(cameras), np.sum([often for _, often in found], axis=0))
+
+
+def candidates(
+    subject: Subject, limits: Limits, around: Placed, fixed: tuple[RigCamera, ...] = ()
+) -> Candidates:
+    """The cameras that were placed ``around`` the subject, and the ``fixed`` ones, weighed."""
+    chosen, share = _weighed_points(around.often)
     whole = replace(subject, design_points=subject.check_points.subset(chosen))
-    return _weighed(whole, share, limits, (*found, *fixed), len(fixed), middle)
+    middle = subject.design_points.centroid_mm
+    return _weighed(whole, share, limits, (*around.cameras, *fixed), len(fixed), middle)
 
 
 def _facing(subject: Subject) -> Floats:
@@ -187,13 +247,6 @@ def _weighed_points(often: Ints) -> tuple[Ints, Floats]:
     chosen = np.concatenate([hard, others])
     back = np.argsort(chosen, kind="stable")
     return chosen[back], weight[back] / len(often)
-
-
-def _pose(camera: Camera, limits: Limits, points_mm: Floats, away: Floats, middle: Floats) -> Pose:
-    roll, nearest = better_roll(camera, limits, points_mm, -away, middle)
-    low, high = limits.stand_off.min_mm or 0.0, limits.stand_off.max_mm or np.inf
-    distance = float(np.clip(_ROOM * nearest, low, high))
-    return Pose(middle + distance * away, look_at_rotation(np.zeros(3), -away, roll))
 
 
 def _sight(

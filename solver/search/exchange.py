@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,8 +13,9 @@ from geometry.arrays import Floats, Ints
 from geometry.camera import Camera, RigCamera
 from geometry.subject import Subject
 from solver.limits import Limits
-from solver.search.candidates import Candidates, candidates, directions_about
+from solver.search.candidates import Candidates, Placed, candidates, directions_about, placed
 from solver.search.networks import Search
+from solver.workers import Report, Workers, silent
 
 CHAINS = 4
 """Networks grown apart: a chain of shakes ends near where it begins, and which of them ends best
@@ -47,27 +48,35 @@ def search_networks(
     fixed: tuple[RigCamera, ...],
     seed: int,
     cancel: CancelToken,
+    workers: Workers | None = None,
+    around: Placed | None = None,
 ) -> list[tuple[RigCamera, ...]]:
     """Networks of new cameras called ``names``, the best first; none where nobody may stand.
 
-    Only networks that break no rule about pairs of cameras.
+    Only networks that break no rule about pairs of cameras. They are chosen ``around`` the subject
+    first, among cameras 6 degrees apart without it, then more finely. ``workers`` share the work,
+    and do not change what comes of it. Raises :class:`CancelledError` soon after ``cancel`` is set.
     """
+    workers = workers or Workers()
     middle = subject.design_points.centroid_mm
     with threadpool_limits(1):
-        pool = candidates(subject, camera, limits, fixed, cancel)
+        around = around or placed(subject, camera, limits, cancel, workers=workers)
+        pool = candidates(subject, limits, around, fixed)
         if pool.free < len(names):
             return []
-        found = exchange(Search(pool, limits), len(names), seed, cancel, _shakes(SHAKES, names))
+        search, shakes = Search(pool, limits), _shakes(SHAKES, names)
+        found = exchange(search, len(names), seed, cancel, shakes, workers=workers)
         for step_deg, most in FINER if found[0].score[0] == 0 else ():
             some = found[: max(2, most // len(names))]
             outward = [pool.position_mm[_free(pool, f.network)] - middle for f in some]
             outward = [o / np.linalg.norm(o, axis=1, keepdims=True) for o in outward]
             near = directions_about(np.unique(np.concatenate(outward), axis=0), step_deg)
-            pool = candidates(subject, camera, limits, fixed, cancel, outward=near)
+            close = placed(subject, camera, limits, cancel, outward=near, workers=workers)
+            pool = candidates(subject, limits, close, fixed)
             search = Search(pool, limits)
             starts = [_nearest(search, o, middle) for o in outward]
             shakes = _shakes(FINER_SHAKES, names)
-            found = exchange(search, len(names), seed, cancel, shakes, starts)
+            found = exchange(search, len(names), seed, cancel, shakes, starts, workers)
     return [
         tuple(
             replace(pool.cameras[k], name=n)
@@ -109,6 +118,7 @@ def exchange(
     cancel: CancelToken,
     shakes: int,
     starts: Sequence[Ints] = (),
+    workers: Workers | None = None,
 ) -> list[Found]:
     """Networks of ``count`` free cameras, the best first, no two alike in all but one camera.
 
@@ -116,38 +126,55 @@ def exchange(
     that helps most, others with every camera of it put elsewhere. A shake takes some cameras out,
     puts others in their places, each one of the best dozen by chance, and exchanges until nothing
     helps; what is better is kept and shaken on. ``shakes`` of all chains together. The same seed
-    gives the same networks.
+    gives the same networks, however many ``workers`` share the chains. Raises
+    :class:`CancelledError` soon after ``cancel`` is set.
     """
-    chains = len(starts) or CHAINS
-    grown = None if starts else search.grown(search.fixed, count)
+    workers = workers or Workers()
+    begins: list[Ints | None] = list(starts) or [None] * CHAINS
+    each = -(-shakes // len(begins))
+    chains = [_Chain(k, search, count, seed, each, begin) for k, begin in enumerate(begins)]
+    search.prepare()
     kept: dict[tuple[int, ...], Found] = {}
-    for chain in range(chains):
-        if kept and cancel.is_set():
-            break
-        rng = np.random.default_rng([seed, chain])
-        begin = starts[chain] if grown is None else grown
-        if grown is not None and chain > 0:
-            begin = _shaken(search, grown, rng, count)
-        for found in _chain(search, begin, rng, cancel, -(-shakes // chains)):
-            kept[tuple(sorted(found.network.tolist()))] = found
+    for some in workers.run(chains, silent, cancel):
+        kept |= {tuple(sorted(found.network.tolist())): found for found in some}
     return _apart(sorted(kept.values(), key=lambda f: f.score))
 
 
-def _chain(
-    search: Search, begin: Ints, rng: np.random.Generator, cancel: CancelToken, shakes: int
-) -> Iterator[Found]:
-    """The networks of one chain of shakes."""
-    network = search.exchanged(begin)
-    best = Found(network, search.score(network))
-    yield best
-    for _ in range(shakes):
-        if cancel.is_set():
-            break
-        trial = search.exchanged(_shaken(search, best.network, rng))
-        found = Found(trial, search.score(trial))
-        yield found
-        if found.score < best.score:
-            best = found
+@dataclass(frozen=True, eq=False)
+class _Chain:
+    """One chain of shakes of networks of ``count`` free cameras.
+
+    It begins with ``begin``, or with the network that is grown, which all chains but the first
+    put elsewhere.
+    """
+
+    index: int
+    search: Search
+    count: int
+    seed: int
+    shakes: int
+    begin: Ints | None
+
+    def run(self, _report: Report, cancel: CancelToken) -> list[Found]:
+        """All networks that it came by; see :class:`solver.workers.Job`."""
+        search, rng = self.search, np.random.default_rng([self.seed, self.index])
+        network = self.begin
+        if network is None:
+            network = search.grown(search.fixed, self.count)
+            if self.index > 0:
+                network = _shaken(search, network, rng, self.count)
+        network = search.exchanged(network)
+        best = Found(network, search.score(network))
+        out = [best]
+        for _ in range(self.shakes):
+            if cancel.is_set():
+                break
+            trial = search.exchanged(_shaken(search, best.network, rng))
+            found = Found(trial, search.score(trial))
+            out.append(found)
+            if found.score < best.score:
+                best = found
+        return out
 
 
 def _apart(found: list[Found]) -> list[Found]:

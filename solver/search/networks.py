@@ -20,6 +20,41 @@ _COVERAGE_WEIGHT = 30.0
 """A share of points that lack views costs this much times that share, in units of the cost."""
 
 
+ROUGH = 1e-4
+"""Costs by which candidates are ranked are true to this share. They are summed in single precision
+(6e-8), of which the determinant of a point with one view loses up to three digits."""
+
+_LEAST_PRIOR = 1e-4
+"""Of a ray's information; below it the determinant would lose too much."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Rough:
+    """What candidates tell in single precision, in units of the most that one of them tells.
+
+    It halves the memory that is gone through, which is what weighing candidates takes its time by.
+    """
+
+    information: Floats
+    seen: Floats
+    share: Floats
+    prior: float
+    unit: float
+
+    @classmethod
+    def of(cls, pool: Candidates) -> _Rough:
+        """Of all candidates; in double precision where single would not do."""
+        most = max(float(pool.information[:, :3].max(initial=0.0)), pool.prior)
+        kind = np.float32 if pool.prior >= _LEAST_PRIOR * most else np.float64
+        return cls(
+            (pool.information / most).astype(kind),
+            pool.seen.astype(kind),
+            pool.share.astype(kind),
+            pool.prior / most,
+            most,
+        )
+
+
 @dataclass(frozen=True, eq=False)
 class Search:
     """Candidates under limits: which networks are allowed, and what each costs.
@@ -65,30 +100,39 @@ class Search:
     def score(self, network: Ints) -> tuple[int, float]:
         """Rules broken and cost of one network."""
         pool = self.candidates
+        if pool.matches is not None:
+            broken = int(self._broken_with_each(network[:-1])[network[-1]])
+        else:
+            broken = self._broken(network)
+        return broken, self._cost(network)
+
+    def _cost(self, network: Ints) -> float:
+        pool = self.candidates
         entries = pool.information[network].sum(axis=0)
         entries[:3] += pool.prior
         cost = covariance_norms(entries) @ pool.share
-        factor = self._shortfall_factor(pool.seen[network].sum(axis=0))
-        return int(self._broken_with_each(network[:-1])[network[-1]]), float(cost * factor)
+        return float(cost * self._shortfall_factor(pool.seen[network].sum(axis=0)))
 
     def scores_with_each(self, rest: Ints, at_least: int = 1) -> tuple[Ints, Floats]:
         """Rules broken (m,) and cost (m,) of the network ``rest`` with each free candidate added.
 
-        The cost is infinite where more rules are broken than by the ``at_least`` best.
+        The cost is infinite where more rules are broken than by the ``at_least`` best, and rounded
+        to :data:`ROUGH`.
         """
-        pool = self.candidates
-        base = pool.information[rest].sum(axis=0)
-        base[:3] += pool.prior
-        count = pool.seen[rest].sum(axis=0)
+        pool, rough = self.candidates, self._rough
         broken = self._broken_with_each(rest)
         free = broken[: pool.free]
-        most = np.sort(free)[min(at_least, len(free)) - 1]
+        most = np.partition(free, min(at_least, len(free)) - 1)[min(at_least, len(free)) - 1]
         cost = np.full(len(pool), np.inf)
         worth = np.flatnonzero(free <= most)
+        base = rough.information[rest].sum(axis=0)
+        base[:3] += rough.prior
         for first in range(0, len(worth), _AT_A_TIME):
             some = worth[first : first + _AT_A_TIME]
-            norms = covariance_norms(base[None] + pool.information[some])
-            cost[some] = (norms @ pool.share) * self._shortfall_factor(count + pool.seen[some])
+            entries = rough.information[some]
+            entries += base
+            cost[some] = covariance_norms(entries) @ rough.share / rough.unit
+        cost[worth] *= 1.0 + _COVERAGE_WEIGHT * self._lack_with_each(rest)[worth]
         return broken, cost
 
     def costs_without(self, network: Ints, places: Ints) -> Floats:
@@ -105,17 +149,44 @@ class Search:
             cost[first : first + _AT_A_TIME] = (norms @ pool.share) * factor
         return cost
 
+    def prepare(self) -> None:
+        """Have ready what every network needs, before the search is handed to several processes."""
+        _ = self.too_close, self.near, self._rough
+
+    @cached_property
+    def _rough(self) -> _Rough:
+        return _Rough.of(self.candidates)
+
+    def _broken(self, network: Ints) -> int:
+        """Rules that a network breaks, those about matches apart."""
+        among = self.too_close[network][:, network]
+        broken = int(np.triu(among, 1).sum())
+        if self.near is not None:
+            broken += int((~self.near[network][:, network].any(axis=1)).sum())
+        return broken
+
     def _broken_with_each(self, rest: Ints) -> Ints:
-        among = self.too_close[np.ix_(rest, rest)]
-        inside = int(np.triu(among, 1).sum())
-        broken = inside + self.too_close[:, rest].sum(axis=1)
+        among = self.too_close[rest]
+        broken = among.sum(axis=0) + int(np.triu(among[:, rest], 1).sum())
         if self.near is not None and len(rest):
-            lonely = rest[~self.near[np.ix_(rest, rest)].any(axis=1)]
-            broken = broken + (~self.near[:, lonely]).sum(axis=1)
-            broken = broken + ~self.near[:, rest].any(axis=1)
+            near = self.near[rest]
+            lonely = ~near[:, rest].any(axis=1)
+            broken += (~near[lonely]).sum(axis=0)
+            broken += ~near.any(axis=0)
         if self.candidates.matches is not None:
             broken = broken + self.candidates.matches.broken_with_each(rest)
         return np.asarray(broken)
+
+    def _lack_with_each(self, rest: Ints) -> Floats:
+        """The share (m,) by which the worst tier of coverage is missed with each candidate."""
+        pool, rough = self.candidates, self._rough
+        count = pool.seen[rest].sum(axis=0)
+        lack = np.zeros(len(pool), dtype=rough.share.dtype)
+        for tier in self.limits.coverage.tiers:
+            enough = float((count >= tier.views) @ pool.share)
+            wins = np.where(count == tier.views - 1, rough.share, rough.share.dtype.type(0.0))
+            np.maximum(lack, tier.share - enough - rough.seen @ wins, out=lack)
+        return lack
 
     def _shortfall_factor(self, count: Ints) -> Floats:
         """By how much (...) the cost is raised for views lacking among the counts (..., p)."""
@@ -133,8 +204,11 @@ class Search:
         known = self._best_additions.get(rest.tobytes())
         if known is None:
             broken, cost = self.scores_with_each(rest)
-            at = _least(broken, cost, self.candidates.free)
-            known = at, (int(broken[at]), float(cost[at]))
+            # What lies within the rounding of the best is weighed exactly.
+            close = np.flatnonzero(cost <= cost.min() * (1.0 + ROUGH))
+            exact = [self._cost(np.append(rest, at)) for at in close]
+            best = int(np.argmin(exact))
+            known = int(close[best]), (int(broken[close[best]]), exact[best])
             self._best_additions[rest.tobytes()] = known
         return known
 
@@ -168,9 +242,3 @@ class Search:
             if not moved:
                 break
         return network
-
-
-def _least(broken: Ints, cost: Floats, free: int) -> int:
-    """Index of the least broken, then cheapest of the first ``free``."""
-    order = np.lexsort((cost[:free], broken[:free]))
-    return int(order[0])

@@ -34,7 +34,7 @@ from solver.problem import Problem, camera_at
 from solver.quality import evaluate
 from solver.result import Design, Status
 from solver.search import exchange
-from solver.search.candidates import candidates
+from solver.search.candidates import placed
 from solver.strategy import Strategy
 
 
@@ -45,7 +45,7 @@ def coarser_candidates() -> Iterator[None]:
         patch.setattr(exchange, "SHAKES", 10)
         patch.setattr(exchange, "FINER_SHAKES", 5)
         patch.setattr(exchange, "FINER", ((3.0, 20),))
-        patch.setattr(exchange, "candidates", partial(candidates, step_deg=10.0))
+        patch.setattr("solver.design.placed", partial(placed, step_deg=10.0))
         yield
 
 

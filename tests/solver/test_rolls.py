@@ -24,7 +24,7 @@ from solver.limits import (
 from solver.problem import Problem
 from solver.quality import evaluate
 from solver.result import Design
-from solver.search.candidates import candidates
+from solver.search.candidates import placed
 from solver.starts import kmeans_start, strips, turned
 
 OFF = Limits(frame=None, depth_of_field=False, body_clearance_mm=None, sight_line_clearance_mm=None)
@@ -123,7 +123,7 @@ def test_starts_and_candidates_keep_to_what_is_allowed(roll: Roll) -> None:
     kind, names = rigs.compact_camera(), rigs.names(3)
     networks = [kmeans_start(subject, kind, limits, names, 0, jitter=1.0)]
     networks += strips(subject, kind, limits, names)[:1]
-    networks.append(candidates(subject, kind, limits, step_deg=40.0).cameras)
+    networks.append(placed(subject, kind, limits, step_deg=40.0).cameras)
     for cameras in networks:
         assert off(cameras, roll) < 1e-9
     askew = Pose.looking_at(np.array([100.0, -700.0, 200.0]), np.zeros(3), 200.0)

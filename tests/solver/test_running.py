@@ -19,17 +19,14 @@ from solver.formulation import Merit, candidate_constraints, covariance_cost, me
 from solver.infeasibility import conflicts
 from solver.limits import BaseHeight, Coverage, CoverageTier, Incidence, PoseBounds, StandOff
 from solver.outer_loop import THINNED_POINTS, StartResult, run_start, thinned
-from solver.pool import StartJob, run_all
+from solver.pool import StartJob
 from solver.problem import Problem
 from solver.quality import evaluate
 from solver.refinement import refine
 from solver.variables import FOCUS, PER_CAMERA
+from solver.workers import Workers, silent
 
 NEVER = NeverCancelled()
-
-
-def silent(*_: float) -> None:
-    return None
 
 
 def face_problem(count: int = 3, points: int = 60, **changes: object) -> Problem:
@@ -184,10 +181,11 @@ def jobs(count: int) -> list[StartJob]:
 @pytest.mark.slow
 def test_results_come_in_the_order_of_their_jobs_whatever_the_workers() -> None:
     heard: list[int] = []
-    here = run_all(jobs(2), 1, lambda start, *_: heard.append(start), NEVER)
+    here = Workers(1).run(jobs(2), lambda start, *_: heard.append(start), NEVER)
     assert set(heard) == {0, 1}
     heard.clear()
-    apart = run_all(jobs(2), 2, lambda start, *_: heard.append(start), NEVER)
+    with Workers(2) as workers:
+        apart = workers.run(jobs(2), lambda start, *_: heard.append(start), NEVER)
     assert set(heard) <= {0, 1}
     assert len(here) == len(apart) == 2
     for one, other in zip(here, apart, strict=True):
@@ -195,13 +193,13 @@ def test_results_come_in_the_order_of_their_jobs_whatever_the_workers() -> None:
 
 
 @pytest.mark.slow
-def test_a_cancelled_pool_raises_and_leaves_the_environment_as_it_was() -> None:
+def test_cancelled_workers_raise_and_leave_the_environment_as_it_was() -> None:
     before = dict(os.environ)
     cancel = threading.Event()
     cancel.set()
-    for workers in (1, 2):
-        with pytest.raises(CancelledError):
-            run_all(jobs(2), workers, silent, cancel)
+    for count in (1, 2):
+        with pytest.raises(CancelledError), Workers(count) as workers:
+            workers.run(jobs(2), silent, cancel)
     assert dict(os.environ) == before
 
 

@@ -15,13 +15,15 @@ from common.progress import NeverCancelled
 from geometry.arrays import Bools
 from solver.quality import evaluate
 from solver.search.bound import bound_of, lower_bound
-from solver.search.candidates import Candidates, candidates
+from solver.search.candidates import Candidates, candidates, placed
 from solver.search.networks import covariance_norms
 
 
 @cache
 def pool() -> Candidates:
-    whole = candidates(rigs.face(60, 120), rigs.compact_camera(), rigs.face_limits(), step_deg=20.0)
+    subject, limits = rigs.face(60, 120), rigs.face_limits()
+    around = placed(subject, rigs.compact_camera(), limits, step_deg=20.0)
+    whole = candidates(subject, limits, around)
     chosen = np.random.default_rng(3).choice(len(whole), 12, replace=False)
     return replace(
         whole,

@@ -17,9 +17,8 @@ from common.errors import CancelledError
 from common.progress import NeverCancelled
 from solver.design import design
 from solver.limits import BaseHeight, Coverage, Limits
-from solver.search import built as module
 from solver.search.built import Build, built_network, filtered, next_best_views
-from solver.search.candidates import candidates
+from solver.search.candidates import placed
 from solver.search.networks import Search
 from solver.strategy import Strategy
 
@@ -90,7 +89,8 @@ def test_a_build_ends_soon_after_it_is_cancelled(build: Build) -> None:
 @pytest.fixture
 def coarser_candidates() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(module, "candidates", partial(candidates, step_deg=14.0))
+        for user in ("solver.search.built", "solver.design"):
+            patch.setattr(f"{user}.placed", partial(placed, step_deg=14.0))
         yield
 
 

@@ -17,7 +17,7 @@ from solver.limits import BaseHeight, Coverage, CoverageTier, Limits
 from solver.matching import Matching, PairTier
 from solver.problem import Problem
 from solver.quality import evaluate
-from solver.search.candidates import Candidates, candidates
+from solver.search.candidates import Candidates, candidates, placed
 from solver.search.exchange import exchange
 from solver.search.matches import Matches
 from solver.search.networks import Search
@@ -32,7 +32,9 @@ FREE = rigs.face_limits(base_height=BaseHeight(min=0.1), coverage=Coverage((Cove
 
 @cache
 def pool(limits: Limits) -> Candidates:
-    return candidates(rigs.face(30, 120), rigs.compact_camera(), limits, step_deg=STEP_DEG)
+    subject = rigs.face(30, 120)
+    around = placed(subject, rigs.compact_camera(), limits, step_deg=STEP_DEG)
+    return candidates(subject, limits, around)
 
 
 def matches() -> Matches:
@@ -113,7 +115,7 @@ def test_weights_are_of_the_points_that_any_two_candidates_could_match() -> None
 
 @pytest.mark.slow
 def test_a_design_keeps_what_is_asked_while_it_is_moved(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("solver.search.exchange.candidates", partial(candidates, step_deg=STEP_DEG))
+    monkeypatch.setattr("solver.design.placed", partial(placed, step_deg=STEP_DEG))
     subject, limits = rigs.face(30, 120), replace(FREE, matching=MATCHING)
     found = design(
         subject, rigs.compact_camera(), limits, count=3, starts=1, strategy=Strategy.K_MEANS

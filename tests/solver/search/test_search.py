@@ -13,8 +13,11 @@ import rigs
 
 from common.errors import CancelledError
 from common.progress import NeverCancelled
+from geometry.arrays import Floats
+from geometry.camera import RigCamera
+from geometry.subject import Subject
 from solver.information import covariance_norms, normal_matrices
-from solver.limits import BaseHeight, Coverage, CoverageTier, HalfSpace, StandOff, Zones
+from solver.limits import BaseHeight, Coverage, CoverageTier, HalfSpace, Limits, StandOff, Zones
 from solver.problem import Problem
 from solver.quality import evaluate
 from solver.search.candidates import (
@@ -26,9 +29,10 @@ from solver.search.candidates import (
     candidates,
     directions,
     directions_about,
+    placed,
 )
 from solver.search.exchange import exchange
-from solver.search.networks import Search
+from solver.search.networks import ROUGH, Search
 
 STEP_DEG = 12.0
 """Coarser than the search's own, for speed."""
@@ -36,9 +40,21 @@ STEP_DEG = 12.0
 LIMITS = rigs.face_limits(base_height=BaseHeight(min=0.15, neighbour_max=0.5))
 
 
+def weighed(
+    subject: Subject,
+    limits: Limits,
+    fixed: tuple[RigCamera, ...] = (),
+    step_deg: float = STEP_DEG,
+    outward: Floats | None = None,
+) -> Candidates:
+    camera = rigs.compact_camera()
+    around = placed(subject, camera, limits, step_deg=step_deg, outward=outward)
+    return candidates(subject, limits, around, fixed)
+
+
 @cache
 def pool() -> Candidates:
-    return candidates(rigs.face(60, 120), rigs.compact_camera(), LIMITS, step_deg=STEP_DEG)
+    return weighed(rigs.face(60, 120), LIMITS)
 
 
 def some(count: int, seed: int = 0) -> Candidates:
@@ -108,7 +124,7 @@ def test_a_candidate_looked_at_closely_stands_where_all_that_it_sees_from_there_
     limits = replace(LIMITS, coverage=Coverage(), stand_off=StandOff(None, None))
     aside = np.array([0.5, -0.8, 0.1]) / np.sqrt(0.9)
     outward = directions(aside, 30.0)
-    found = candidates(rigs.face(60, 400), rigs.compact_camera(), limits, outward=outward)
+    found = weighed(rigs.face(60, 400), limits, outward=outward)
     assert len(found) > 5
     for camera in found.cameras:
         quality = evaluate(rigs.face(60, 400), (camera,), limits)
@@ -176,6 +192,17 @@ def test_scores_are_the_rule_read_out() -> None:
         assert cost == pytest.approx(expected[1], rel=1e-9)
 
 
+@pytest.mark.parametrize("views", [2, 3])
+def test_candidates_are_ranked_as_whole_networks_are_scored(views: int) -> None:
+    limits = replace(LIMITS, coverage=Coverage((CoverageTier(views, 0.99),)))
+    search = Search(pool(), limits)
+    for rest in (np.array([2, 40]), np.array([7, 21, 66])):
+        broken, cost = search.scores_with_each(rest, len(pool()))
+        exact = [search.score(np.append(rest, k)) for k in range(len(pool()))]
+        np.testing.assert_array_equal(broken, [b for b, _ in exact])
+        np.testing.assert_allclose(cost, [c for _, c in exact], rtol=ROUGH)
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_no_single_exchange_helps_an_exchanged_network(seed: int) -> None:
     search = Search(some(14, seed), LIMITS)
@@ -216,7 +243,7 @@ def test_growing_adds_the_view_that_helps_most_and_never_harms() -> None:
 def test_fixed_cameras_stay_in_every_network() -> None:
     subject = rigs.face(60, 120)
     old = replace(pool().cameras[10], name="old", fixed=True)
-    with_old = candidates(subject, rigs.compact_camera(), LIMITS, (old,), step_deg=STEP_DEG)
+    with_old = weighed(subject, LIMITS, (old,))
     assert with_old.fixed == 1
     assert with_old.cameras[-1] is old
     search = Search(with_old, LIMITS)
@@ -227,21 +254,17 @@ def test_fixed_cameras_stay_in_every_network() -> None:
 
 def test_nobody_stands_where_a_zone_forbids() -> None:
     above = Zones(allowed=(HalfSpace(np.array([0.0, 0.0, 1.0]), 0.0),))
-    allowed = candidates(
-        rigs.face(60, 120), rigs.compact_camera(), replace(LIMITS, zones=above), step_deg=STEP_DEG
-    )
+    allowed = weighed(rigs.face(60, 120), replace(LIMITS, zones=above))
     assert 0 < len(allowed) < len(pool())
     assert (allowed.position_mm[:, 2] > 0.0).all()
     nowhere = Zones(allowed=(HalfSpace(np.array([0.0, 1.0, 0.0]), 5000.0),))
-    none = candidates(
-        rigs.face(60, 120), rigs.compact_camera(), replace(LIMITS, zones=nowhere), step_deg=STEP_DEG
-    )
+    none = weighed(rigs.face(60, 120), replace(LIMITS, zones=nowhere))
     assert len(none) == 0
 
 
 def test_the_stand_off_is_kept_to() -> None:
     far = replace(LIMITS, stand_off=StandOff(1200.0, 1300.0))
-    found = candidates(rigs.face(60, 120), rigs.compact_camera(), far, step_deg=STEP_DEG)
+    found = weighed(rigs.face(60, 120), far)
     np.testing.assert_allclose(found.distance_mm, 1200.0, rtol=0.02)
 
 
@@ -257,4 +280,4 @@ def test_a_cancelled_search_stops() -> None:
     cancel = threading.Event()
     cancel.set()
     with pytest.raises(CancelledError):
-        candidates(rigs.face(60, 120), rigs.compact_camera(), LIMITS, cancel=cancel)
+        placed(rigs.face(60, 120), rigs.compact_camera(), LIMITS, cancel=cancel)
