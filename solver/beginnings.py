@@ -72,15 +72,11 @@ def searched(
     request: Request, around: Placed, helpers: Workers, cancel: CancelToken
 ) -> list[StartJob]:
     """The best networks of the search among the candidates ``around`` the subject."""
-    order = request.subject, request.camera, request.limits, request.names, request.fixed
     build = _BUILT.get(request.strategy)
     if build is None:
-        kind, found = (
-            Strategy.EXCHANGE,
-            search_networks(*order, request.seed, cancel, helpers, around),
-        )
+        kind, found = Strategy.EXCHANGE, search_networks(request, around, cancel, helpers)
     else:
-        kind, found = request.strategy, built_network(*order, build, cancel, around)
+        kind, found = request.strategy, built_network(request, around, cancel, build)
     if cancel.is_set():
         raise CancelledError
     return [

@@ -7,11 +7,11 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from multiprocessing.queues import Queue
 from multiprocessing.synchronize import Event
-from types import TracebackType
-from typing import Any, Protocol, Self, TypeVar
+from typing import Any, Protocol, TypeVar
 
 from threadpoolctl import threadpool_limits
 
+from common.closing import Closing
 from common.errors import CancelledError
 from common.processes import end_with_parent, single_threaded_children
 from common.progress import CancelToken
@@ -106,7 +106,7 @@ class _Processes:
         self.messages.close()
 
 
-class Workers:
+class Workers(Closing):
     """So many processes, which do one batch of jobs after the other until they are let go.
 
     They begin when there is work for more than one; with one there are none, and the work is done
@@ -117,17 +117,8 @@ class Workers:
         self.count = max(1, count)
         self._processes: _Processes | None = None
 
-    def __enter__(self) -> Self:
-        """To be let go at the end of a ``with`` block."""
-        return self
-
-    def __exit__(
-        self,
-        _kind: type[BaseException] | None,
-        _error: BaseException | None,
-        _trace: TracebackType | None,
-    ) -> None:
-        """Have the processes stop and wait for their end."""
+    def close(self) -> None:
+        """Have the processes stop, and wait for their end."""
         processes, self._processes = self._processes, None
         if processes is not None:
             processes.end()

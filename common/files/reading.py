@@ -6,6 +6,8 @@ import errno
 import json
 import os
 import stat
+from collections.abc import Generator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -55,18 +57,29 @@ def read_json(path: Path, kind: str, words: str, largest_bytes: int) -> Any:  # 
     :class:`TooLargeError` ``<kind>-too-large``.
     """
     remedy = f"give a {kind}.json"
+    with readable(path, kind, words, remedy, largest_bytes):
+        try:
+            return json_in(path)
+        except ValueError as error:
+            raise InputError(f"{kind}-not-json", f"{path.name} is not JSON", remedy) from error
+
+
+@contextmanager
+def readable(path: Path, kind: str, words: str, remedy: str, largest_bytes: int) -> Generator[None]:
+    """Refuse a file that is too large or no plain one, and say why one cannot be read.
+
+    Raises :class:`InputError` ``<kind>-unreadable``, :class:`TooLargeError` ``<kind>-too-large``.
+    """
     try:
         if plain_size(path) > largest_bytes:
             problem = f"{path.name} is too large for a {words}"
             raise TooLargeError(f"{kind}-too-large", problem, remedy)
-        return json_in(path)
+        yield
     except OSError as error:
         reason = (error.strerror or "unreadable").lower()
         raise InputError(
             f"{kind}-unreadable", f"cannot read the {words} {path} ({reason})", "check the path"
         ) from error
-    except ValueError as error:
-        raise InputError(f"{kind}-not-json", f"{path.name} is not JSON", remedy) from error
 
 
 def read_limited(path: Path) -> bytes:

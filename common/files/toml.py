@@ -6,8 +6,8 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from common.errors import InputError, TooLargeError
-from common.files.reading import BYTE_ORDER_MARK, plain_size
+from common.errors import InputError
+from common.files.reading import BYTE_ORDER_MARK, readable
 
 LARGEST_FILE_BYTES = 1_000_000
 """What people write by hand is a page or two; a larger file is another one, given by mistake."""
@@ -20,19 +20,12 @@ def read_text(path: Path, kind: str, words: str, largest_bytes: int = LARGEST_FI
     :class:`TooLargeError` ``<kind>-too-large``.
     """
     remedy = f"give a {words} as TOML"
-    try:
-        if plain_size(path) > largest_bytes:
-            problem = f"{path.name} is too large for a {words}"
-            raise TooLargeError(f"{kind}-too-large", problem, remedy)
-        return path.read_text(encoding="utf-8")
-    except OSError as error:
-        reason = (error.strerror or "unreadable").lower()
-        raise InputError(
-            f"{kind}-unreadable", f"cannot read the {words} {path} ({reason})", "check the path"
-        ) from error
-    except UnicodeDecodeError as error:
-        problem = f"{path.name} is not a text file"
-        raise InputError(f"{kind}-not-toml", problem, remedy) from error
+    with readable(path, kind, words, remedy, largest_bytes):
+        try:
+            return path.read_text(encoding="utf-8")
+        except UnicodeDecodeError as error:
+            problem = f"{path.name} is not a text file"
+            raise InputError(f"{kind}-not-toml", problem, remedy) from error
 
 
 def parsed(text: str, name: str, kind: str, words: str) -> dict[str, Any]:

@@ -10,33 +10,24 @@ from threadpoolctl import threadpool_limits
 
 from common.progress import CancelToken, go_on
 from geometry.arrays import Ints
-from geometry.camera import Camera, RigCamera
-from geometry.subject import Subject
-from solver.limits import Limits
-from solver.search.candidates import Placed, candidates, placed
+from geometry.camera import RigCamera
+from solver.request import Request
+from solver.search.candidates import Placed, candidates
 from solver.search.networks import Search
 
 Build = Callable[[Search, int, CancelToken], Ints]
 
 
 def built_network(
-    subject: Subject,
-    camera: Camera,
-    limits: Limits,
-    names: tuple[str, ...],
-    fixed: tuple[RigCamera, ...],
-    build: Build,
-    cancel: CancelToken,
-    around: Placed | None = None,
+    request: Request, around: Placed, cancel: CancelToken, build: Build
 ) -> list[tuple[RigCamera, ...]]:
-    """The one network of new cameras called ``names`` that ``build`` makes of the candidates.
+    """The one network of new cameras that ``build`` makes of the candidates ``around`` the subject.
 
-    They are those ``around`` the subject, which stand 6 degrees apart without it. None where the
-    network would break a rule about pairs of cameras.
+    None where it would break a rule about pairs of cameras.
     """
+    limits, names = request.limits, request.names
     with threadpool_limits(1):
-        around = around or placed(subject, camera, limits, cancel)
-        pool = candidates(subject, limits, around, fixed)
+        pool = candidates(request.subject, limits, around, request.fixed)
         if pool.free < len(names):
             return []
         search = Search(pool, limits)

@@ -10,9 +10,8 @@ from threadpoolctl import threadpool_limits
 
 from common.progress import CancelToken
 from geometry.arrays import Floats, Ints
-from geometry.camera import Camera, RigCamera
-from geometry.subject import Subject
-from solver.limits import Limits
+from geometry.camera import RigCamera
+from solver.request import Request
 from solver.search.candidates import Candidates, Placed, candidates, directions_about, placed
 from solver.search.networks import Search
 from solver.workers import Report, Workers, silent
@@ -41,42 +40,33 @@ _APART = 2
 
 
 def search_networks(
-    subject: Subject,
-    camera: Camera,
-    limits: Limits,
-    names: tuple[str, ...],
-    fixed: tuple[RigCamera, ...],
-    seed: int,
-    cancel: CancelToken,
-    workers: Workers | None = None,
-    around: Placed | None = None,
+    request: Request, around: Placed, cancel: CancelToken, workers: Workers
 ) -> list[tuple[RigCamera, ...]]:
-    """Networks of new cameras called ``names``, the best first; none where nobody may stand.
+    """Networks of as many new cameras as are asked for, the best first; none where none may be.
 
     Only networks that break no rule about pairs of cameras. They are chosen ``around`` the subject
-    first, among cameras 6 degrees apart without it, then more finely. ``workers`` share the work,
-    and do not change what comes of it. Raises :class:`CancelledError` soon after ``cancel`` is set.
+    first, then more finely. ``workers`` share the work, and do not change what comes of it. Raises
+    :class:`CancelledError` soon after ``cancel`` is set.
     """
-    workers = workers or Workers()
-    middle = subject.design_points.centroid_mm
+    subject, limits, names, fixed = request.subject, request.limits, request.names, request.fixed
+    middle = request.target_mm
     with threadpool_limits(1):
-        around = around or placed(subject, camera, limits, cancel, workers=workers)
         pool = candidates(subject, limits, around, fixed)
         if pool.free < len(names):
             return []
         search, shakes = Search(pool, limits), _shakes(SHAKES, names)
-        found = exchange(search, len(names), seed, cancel, shakes, workers=workers)
+        found = exchange(search, len(names), request.seed, cancel, shakes, workers=workers)
         for step_deg, most in FINER if found[0].score[0] == 0 else ():
             some = found[: max(2, most // len(names))]
             outward = [pool.position_mm[_free(pool, f.network)] - middle for f in some]
             outward = [o / np.linalg.norm(o, axis=1, keepdims=True) for o in outward]
             near = directions_about(np.unique(np.concatenate(outward), axis=0), step_deg)
-            close = placed(subject, camera, limits, cancel, outward=near, workers=workers)
+            close = placed(subject, request.camera, limits, cancel, outward=near, workers=workers)
             pool = candidates(subject, limits, close, fixed)
             search = Search(pool, limits)
             starts = [_nearest(search, o, middle) for o in outward]
             shakes = _shakes(FINER_SHAKES, names)
-            found = exchange(search, len(names), seed, cancel, shakes, starts, workers)
+            found = exchange(search, len(names), request.seed, cancel, shakes, starts, workers)
     return [
         tuple(
             replace(pool.cameras[k], name=n)

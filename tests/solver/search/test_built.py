@@ -17,6 +17,7 @@ from common.errors import CancelledError
 from common.progress import NeverCancelled
 from solver.design import design
 from solver.limits import BaseHeight, Coverage, Limits
+from solver.request import Request
 from solver.search.built import Build, built_network, filtered, next_best_views
 from solver.search.candidates import placed
 from solver.search.networks import Search
@@ -89,18 +90,17 @@ def test_a_build_ends_soon_after_it_is_cancelled(build: Build) -> None:
 @pytest.fixture
 def coarser_candidates() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
-        for user in ("solver.search.built", "solver.design"):
-            patch.setattr(f"{user}.placed", partial(placed, step_deg=14.0))
+        patch.setattr("solver.design.placed", partial(placed, step_deg=14.0))
         yield
 
 
-@pytest.mark.usefixtures("coarser_candidates")
 @pytest.mark.parametrize("build", BUILDS)
 def test_no_network_where_its_rules_cannot_be_kept(build: Build) -> None:
     limits = rigs.face_limits(coverage=Coverage(), base_height=BaseHeight(min=3.0))
-    subject = rigs.face(20, 40)
-    order = subject, rigs.compact_camera(), limits, rigs.names(3), ()
-    assert built_network(*order, build, NEVER) == []
+    subject, camera = rigs.face(20, 40), rigs.compact_camera()
+    request = Request(subject, camera, limits, 3, 0, 8, (), None, Strategy.FILTERING)
+    around = placed(subject, camera, limits, NEVER, step_deg=14.0)
+    assert built_network(request, around, NEVER, build) == []
 
 
 @pytest.mark.usefixtures("coarser_candidates")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Iterator
-from functools import cache, partial
+from functools import cache
 from itertools import combinations
 
 import numpy as np
@@ -15,14 +15,17 @@ from hypothesis import strategies as st
 from made_pools import pool
 
 from common.errors import CancelledError
-from common.progress import NeverCancelled
+from common.progress import CancelToken, NeverCancelled
 from geometry.camera import RigCamera
 from solver.limits import BaseHeight, Coverage, HalfSpace, Limits, Zones
 from solver.quality import evaluate
+from solver.request import Request
 from solver.search import exchange as module
 from solver.search.candidates import placed
 from solver.search.exchange import Found, exchange, search_networks
 from solver.search.networks import Search
+from solver.strategy import Strategy
+from solver.workers import Workers
 
 NEVER = NeverCancelled()
 LIMITS = rigs.face_limits(coverage=Coverage(), base_height=BaseHeight(min=0.15, neighbour_max=0.5))
@@ -35,15 +38,21 @@ def coarser_candidates() -> Iterator[None]:
         patch.setattr(module, "SHAKES", 6)
         patch.setattr(module, "FINER_SHAKES", 3)
         patch.setattr(module, "FINER", ((5.0, 12),))
-        patch.setattr(module, "placed", partial(placed, step_deg=14.0))
         yield
 
 
+def searched(
+    limits: Limits = LIMITS, count: int = 3, cancel: CancelToken = NEVER
+) -> list[tuple[RigCamera, ...]]:
+    subject, camera = rigs.face(30, 60), rigs.compact_camera()
+    request = Request(subject, camera, limits, count, 0, 8, (), None, Strategy.EXCHANGE)
+    around = placed(subject, camera, limits, cancel, step_deg=14.0)
+    return search_networks(request, around, cancel, Workers())
+
+
 @cache
-def networks(seed: int = 0) -> list[tuple[RigCamera, ...]]:
-    return search_networks(
-        rigs.face(30, 60), rigs.compact_camera(), LIMITS, rigs.names(3), (), seed, NEVER
-    )
+def networks() -> list[tuple[RigCamera, ...]]:
+    return searched()
 
 
 def test_networks_are_complete_named_in_order_and_different() -> None:
@@ -67,9 +76,7 @@ def test_the_best_network_comes_first_and_breaks_no_rule_about_pairs() -> None:
 
 
 def test_the_same_seed_gives_the_same_networks() -> None:
-    again = search_networks(
-        rigs.face(30, 60), rigs.compact_camera(), LIMITS, rigs.names(3), (), 0, NEVER
-    )
+    again = searched()
     for one, other in zip(networks(), again, strict=True):
         for a, b in zip(one, other, strict=True):
             assert a.pose.position_rig_mm.tobytes() == b.pose.position_rig_mm.tobytes()
@@ -78,9 +85,7 @@ def test_the_same_seed_gives_the_same_networks() -> None:
 
 def test_a_finer_look_about_the_networks_never_ends_worse(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "FINER", ())
-    coarse = search_networks(
-        rigs.face(30, 60), rigs.compact_camera(), LIMITS, rigs.names(3), (), 0, NEVER
-    )
+    coarse = searched()
     before, after = (
         evaluate(rigs.face(30, 60), found[0], LIMITS).cost_mm2 for found in (coarse, networks())
     )
@@ -131,25 +136,21 @@ def test_the_exchange_is_never_worse_than_a_network_it_is_given() -> None:
 
 def test_where_nobody_may_stand_there_is_no_network() -> None:
     far = Zones(allowed=(HalfSpace(np.array([0.0, 1.0, 0.0]), 5000.0),))
-    limits = rigs.face_limits(zones=far)
-    args = (rigs.face(30, 60), rigs.compact_camera(), limits, rigs.names(2), (), 0, NEVER)
-    assert search_networks(*args) == []
+    limits = rigs.face_limits(zones=far, coverage=Coverage())
+    assert searched(limits, 2) == []
 
 
 def test_rules_that_no_network_can_keep_give_none() -> None:
     # All candidates stand about as far away, so no base is three times the height.
-    limits = rigs.face_limits(base_height=BaseHeight(min=3.0))
-    args = (rigs.face(30, 60), rigs.compact_camera(), limits, rigs.names(2), (), 0, NEVER)
-    assert search_networks(*args) == []
+    limits = rigs.face_limits(base_height=BaseHeight(min=3.0), coverage=Coverage())
+    assert searched(limits, 2) == []
 
 
 def test_a_cancelled_search_says_so_before_it_looks() -> None:
     cancel = threading.Event()
     cancel.set()
     with pytest.raises(CancelledError):
-        search_networks(
-            rigs.face(30, 60), rigs.compact_camera(), LIMITS, rigs.names(2), (), 0, cancel
-        )
+        searched(count=2, cancel=cancel)
 
 
 def test_an_exchange_that_is_told_to_stop_says_so() -> None:
