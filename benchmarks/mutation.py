@@ -75,7 +75,7 @@ def _copy_project(copy: Path, target: str, tests: tuple[str, ...]) -> None:
     project = tomlkit.parse(text)
     top = target.split("/", 1)[0]
     pattern = target if target.endswith(".py") else f"{target}/*"
-    project["tool"]["mutmut"] = {  # type: ignore[index]
+    project["tool"]["mutmut"] = {
         "source_paths": [top],
         "only_mutate": [pattern],
         "also_copy": [n for n in (*COPIED, "benchmarks") if n != top and (copy / n).is_dir()],
@@ -102,7 +102,7 @@ def _read(where: Path) -> Survivors:
 
 def main() -> None:
     """Print what survived, and fail where too much did."""
-    options = argparse.ArgumentParser(description=__doc__.splitlines()[0])  # type: ignore[union-attr]
+    options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     options.add_argument("target", nargs="?")
     options.add_argument("tests", nargs="*")
     options.add_argument("--children", type=int, default=1, help="processes side by side")

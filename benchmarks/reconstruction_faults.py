@@ -57,7 +57,7 @@ class Bench:
             # The head rests in the middle of the exposure.
             start_s=seconds - 0.5e-6 * EXPOSURE_US,
         )
-        return np.asarray(self.studio.photograph(replace(plain, **what)))  # type: ignore[arg-type]
+        return np.asarray(self.studio.photograph(replace(plain, **what)))
 
     def with_one(self, image: Coded | None) -> Images:
         """The good capture with another picture of the spoilt camera."""

@@ -33,7 +33,7 @@ SCENE = calibrations.small_scene()
 
 
 def started(observations: Observations, **options: object) -> Start:
-    return find_start(observations, CalibrationOptions(start=SCENE.cameras, **options))  # type: ignore[arg-type]
+    return find_start(observations, CalibrationOptions(start=SCENE.cameras, **options))
 
 
 @pytest.fixture(scope="module")
@@ -279,7 +279,7 @@ def test_reference_poses_can_be_the_datum() -> None:
 
 def test_cross_validation_is_near_one_and_sees_a_model_that_does_not_fit() -> None:
     assert calibrations.small_reference().quality.cross_validation is not None
-    ratio = calibrations.small_reference().quality.cross_validation.ratio  # type: ignore[union-attr]
+    ratio = calibrations.small_reference().quality.cross_validation.ratio
     # About 60 directions are compared: one in sqrt(120), doubled for what both halves share.
     assert 0.6 < ratio < 1.4
     observations = SCENE.observe(0.1, 9)

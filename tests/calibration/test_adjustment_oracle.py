@@ -73,7 +73,7 @@ def test_ceres_finds_the_same_with_the_same_sigmas() -> None:
 
     network, solution = solved()
 
-    class UnitQuaternion(pyceres.CostFunction):  # type: ignore[misc, name-defined]
+    class UnitQuaternion(pyceres.CostFunction):
         """Keeps a raw quaternion at length 1; the wheel has no product of manifolds."""
 
         def __init__(self) -> None:
@@ -81,7 +81,7 @@ def test_ceres_finds_the_same_with_the_same_sigmas() -> None:
             self.set_num_residuals(1)
             self.set_parameter_block_sizes([7])
 
-        def Evaluate(self, blocks, residuals, jacobians) -> bool:  # type: ignore[no-untyped-def]  # noqa: ANN001, N802
+        def Evaluate(self, blocks, residuals, jacobians) -> bool:  # noqa: ANN001, N802
             q = blocks[0][:4]
             residuals[0] = 1e8 * (q @ q - 1.0)
             if jacobians is not None and jacobians[0] is not None:

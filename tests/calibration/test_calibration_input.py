@@ -21,7 +21,7 @@ SCENE = calibrations.small_scene()
 GOOD = SCENE.observe(0.1, 1)
 
 
-def rows(condition: np.ndarray) -> Observations:  # type: ignore[type-arg]
+def rows(condition: np.ndarray) -> Observations:
     return GOOD.subset(np.flatnonzero(condition))
 
 

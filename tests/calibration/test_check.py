@@ -129,7 +129,7 @@ def test_a_refocused_lens_is_told_from_a_movement() -> None:
     assert result.findings[0].value == pytest.approx(1e-3, rel=0.1)
 
 
-def true_with(change: np.ndarray, rows: np.ndarray) -> Scene:  # type: ignore[type-arg]
+def true_with(change: np.ndarray, rows: np.ndarray) -> Scene:
     true = SCENE.true_mm.copy()
     true[rows] = change
     return replace(SCENE, true_mm=true)

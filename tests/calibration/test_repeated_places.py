@@ -55,7 +55,7 @@ def test_the_same_pictures_twice_are_alike_and_a_step_of_a_twentieth_is_not() ->
         assert len(places_shown(again).groups) == count, share
 
 
-def added(seen: Observations, pixel: np.ndarray) -> Observations:  # type: ignore[type-arg]
+def added(seen: Observations, pixel: np.ndarray) -> Observations:
     """One capture more, with the first one's targets at these pixels."""
     own = seen.frame == 0
     return replace(

@@ -198,7 +198,7 @@ def test_a_wrong_board_is_explained(
     remedy: str,
     plate_shot: tuple[np.ndarray, dict[str, Floats]],
 ) -> None:
-    kind = dataclasses.replace(scenes.PLATE, **change)  # type: ignore[arg-type]
+    kind = dataclasses.replace(scenes.PLATE, **change)
     found = find_targets(plate_shot[0], plan(kind))
     assert len(found) == 0
     assert [f.code for f in found.findings] == [code]

@@ -140,7 +140,7 @@ def test_a_rotation_given_is_obeyed_and_a_face_aside_is_told(tmp_path: Path) -> 
 )
 def test_a_frame_that_cannot_be_is_refused(wrong: dict[str, object]) -> None:
     with pytest.raises(InputError):
-        ScanOptions(**wrong)  # type: ignore[arg-type]
+        ScanOptions(**wrong)
 
 
 @pytest.mark.slow

@@ -95,10 +95,10 @@ def misbehave(task: Task[MisbehaveRequest, Misbehaved], running: Running) -> Mis
     return Misbehaved(how=how)
 
 
-def find(kind: str) -> Work:  # type: ignore[type-arg]
+def find(kind: str) -> Work:
     if kind == "misbehave":
         return Work(MISBEHAVE, misbehave)
-    return Work(KINDS[kind], count) if kind in KINDS else work_of(kind)  # type: ignore[arg-type]
+    return Work(KINDS[kind], count) if kind in KINDS else work_of(kind)
 
 
 if __name__ == "__main__":

@@ -50,7 +50,7 @@ RIGWRIGHT = [sys.executable, "-W", "error", "-m", "service.cli"]
 
 def rigwright(*arguments: object, **more: object) -> subprocess.CompletedProcess[str]:
     command = [*RIGWRIGHT, *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, check=False, **more)  # type: ignore[call-overload,no-any-return]
+    return subprocess.run(command, capture_output=True, text=True, check=False, **more)
 
 
 class TestClient(StarletteClient):

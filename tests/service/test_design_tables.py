@@ -14,7 +14,7 @@ def figures(name: str, value: float | None, sense: str, limit: float, slack: flo
         name=name,
         value=value,
         limit=limit,
-        sense=sense,  # type: ignore[arg-type]
+        sense=sense,
         unit="px",
         slack=slack,
         active=False,

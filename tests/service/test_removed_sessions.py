@@ -57,7 +57,7 @@ def test_a_session_goes_comes_back_and_is_erased(lab: tuple[TestClient, Path]) -
 def test_a_session_in_use_stays(lab: tuple[TestClient, Path]) -> None:
     client, sessions = lab
     photographed(client, "used", "three")
-    store: Store = client.app.state.service.store  # type: ignore[attr-defined]
+    store: Store = client.app.state.service.store
     waiting = NewJob(CALIBRATION.name, {"session": str(sessions / "used")})
     job = store.jobs.create(waiting, max_pending=10, idempotency_key=None, request_sha256="")
     refused = client.delete("/v1/sessions/used")

@@ -19,7 +19,7 @@ from service.settings import read_settings
 def upload(client: TestClient, path: Path, **more: object) -> object:
     return client.post(
         f"/v1/scans?filename={path.name}&subject=object", content=path.read_bytes(), **more
-    )  # type: ignore[arg-type]
+    )
 
 
 def nothing_stays(service: Service) -> bool:
@@ -146,7 +146,7 @@ def test_a_body_longer_than_allowed_is_cut_off_when_no_length_was_given(
             sent.append(n)
             yield b"x" * 65536
 
-    answer = client.post("/v1/scans?filename=a.ply", content=endless())  # type: ignore[arg-type]
+    answer = client.post("/v1/scans?filename=a.ply", content=endless())
     assert answer.status_code == 413
     assert nothing_stays(service)
 

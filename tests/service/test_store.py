@@ -39,12 +39,12 @@ def keep_scan(store: Store, content: bytes, name: str = "head.glb", **options: s
 
 
 def add_job(store: Store, **given: object) -> str:
-    return store.jobs.create(NewJob("count", {"to": 1}, **given), max_pending=1000).id  # type: ignore[arg-type]
+    return store.jobs.create(NewJob("count", {"to": 1}, **given), max_pending=1000).id
 
 
 def test_the_migrations_build_the_tables_the_code_uses(store: Store) -> None:
     def difference(connection: object) -> list[object]:
-        return compare_metadata(MigrationContext.configure(connection), metadata)  # type: ignore[arg-type]
+        return compare_metadata(MigrationContext.configure(connection), metadata)
 
     assert store.database.read(difference) == []
 
@@ -66,9 +66,7 @@ def test_readers_cannot_write(store: Store) -> None:
 
 def test_a_failed_change_leaves_nothing_and_the_next_one_works(store: Store) -> None:
     def half(connection: object) -> None:
-        connection.execute(  # type: ignore[attr-defined]
-            insert(blobs).values(sha256="ab", size_bytes=1, created_at="now")
-        )
+        connection.execute(insert(blobs).values(sha256="ab", size_bytes=1, created_at="now"))
         raise ZeroDivisionError
 
     with pytest.raises(ZeroDivisionError):

@@ -66,7 +66,7 @@ def standard(strategy: Strategy, workers: int = 1, seed: int = 0) -> Design:
 def place(limits: Limits, count: int = 4, starts: int = 2, **more: object) -> Design:
     """By the classical starts, which are quicker, unless told otherwise."""
     given = {"strategy": Strategy.K_MEANS} | more
-    return design(rigs.face(), rigs.compact_camera(), limits, count=count, starts=starts, **given)  # type: ignore[arg-type]
+    return design(rigs.face(), rigs.compact_camera(), limits, count=count, starts=starts, **given)
 
 
 @pytest.mark.parametrize(
@@ -208,7 +208,7 @@ def test_zones_are_respected_by_whole_bodies() -> None:
         size = camera.camera.body.size_mm / 2.0
         corners = np.array(np.meshgrid(*[(-s, s) for s in size])).reshape(3, -1).T
         body = camera.pose.to_rig(corners + camera.camera.body.centre_camera_mm)
-        assert (body >= zones.allowed[0].low_mm).all()  # type: ignore[union-attr]
+        assert (body >= zones.allowed[0].low_mm).all()
         assert (body[:, 2] <= 350.0).all()
         assert (np.linalg.norm(body - [0.0, -900.0, 0.0], axis=1) >= 150.0).all()
 
@@ -294,5 +294,5 @@ def test_contradicting_limits_are_named_with_what_each_would_have_to_give() -> N
 )
 def test_bad_orders_are_refused(change: dict[str, object], detail: str) -> None:
     with pytest.raises(InputError) as caught:
-        place(rigs.face_limits(), **change)  # type: ignore[arg-type]
+        place(rigs.face_limits(), **change)
     assert caught.value.detail == detail

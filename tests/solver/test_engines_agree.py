@@ -49,7 +49,7 @@ def wall_problem() -> Problem:
 @pytest.mark.parametrize("make", [face_problem, wall_problem])
 @pytest.mark.slow
 def test_ipopt_confirms_our_optimum(make: object) -> None:
-    program, values = program_of(make())  # type: ignore[operator]
+    program, values = program_of(make())
     ours = minimise(program, values, go_on, tolerance=1e-8, gain_tolerance=0.0)
     assert ours.converged
     assert ours.violation < 1e-8

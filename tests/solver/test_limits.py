@@ -83,10 +83,10 @@ def test_a_minimum_above_its_maximum_contradicts_it(one: float, other: float) ->
         (BaseHeight, ("mean_min", "mean_max")),
         (BaseHeight, ("min", "neighbour_max")),
     ):
-        make(**dict(zip(names, (low, high), strict=True)))  # type: ignore[operator]
+        make(**dict(zip(names, (low, high), strict=True)))
         if low < high:
             with pytest.raises(InputError, match="above the maximum") as caught:
-                make(**dict(zip(names, (high, low), strict=True)))  # type: ignore[operator]
+                make(**dict(zip(names, (high, low), strict=True)))
             assert caught.value.detail == "limits-contradict"
 
 
@@ -162,4 +162,4 @@ def test_normals_become_unit_vectors_and_nothing_can_be_changed_afterwards() -> 
     with pytest.raises(ValueError, match="read-only"):
         plane.normal[0] = 1.0
     with pytest.raises(FrozenInstanceError):
-        plane.offset_mm = 3.0  # type: ignore[misc]
+        plane.offset_mm = 3.0

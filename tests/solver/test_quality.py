@@ -71,7 +71,7 @@ def test_whether_limits_are_kept_is_what_the_whole_evaluation_says(
     changes: dict[str, object], broken: set[str]
 ) -> None:
     subject, cameras, _ = network()
-    limits = replace(OFF, **({"coverage": Coverage(())} | changes))  # type: ignore[arg-type]
+    limits = replace(OFF, **({"coverage": Coverage(())} | changes))
     whole = evaluate(subject, cameras, limits)
     assert {row.family for row in whole.violated} == broken
     assert keeps_limits(subject, cameras, limits) == whole.feasible == (not broken)

@@ -156,7 +156,7 @@ def test_large_subjects_are_thinned_at_first() -> None:
     )
     assert len(set(chosen.tolist())) == THINNED_POINTS
     np.testing.assert_array_equal(few.origin_mm, problem.origin_mm)
-    assert not np.array_equal(thinned(problem, 4)[1], chosen)  # type: ignore[index]
+    assert not np.array_equal(thinned(problem, 4)[1], chosen)
 
 
 def test_refinement_meets_the_optimality_conditions() -> None:

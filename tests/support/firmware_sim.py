@@ -173,17 +173,17 @@ class FirmwareSim(Closing):
 
     def close(self) -> None:
         """End the simulator, whatever it is doing. Closing twice changes nothing."""
-        if self._process.stdout.closed:  # type: ignore[union-attr]
+        if self._process.stdout.closed:
             return
         atexit.unregister(self.close)
         with contextlib.suppress(OSError, ValueError):
-            self._process.stdin.close()  # type: ignore[union-attr]
+            self._process.stdin.close()
         with contextlib.suppress(subprocess.TimeoutExpired):
             self._process.wait(0.5)
         with contextlib.suppress(ProcessLookupError):
             os.killpg(self._process.pid, signal.SIGKILL)
         self._process.wait(5)
-        self._process.stdout.close()  # type: ignore[union-attr]
+        self._process.stdout.close()
 
     @property
     def ended(self) -> bool:
@@ -200,7 +200,7 @@ class FirmwareSim(Closing):
 
     def order(self, text: str) -> str:
         """Send one order to the simulator; what it answers behind ``ok``."""
-        self._process.stdin.write(text + "\n")  # type: ignore[union-attr]
+        self._process.stdin.write(text + "\n")
         answer = self._read(text, _ORDER_S)
         if not answer.startswith("ok"):
             raise RuntimeError(f"{self.simulator}: {answer}")

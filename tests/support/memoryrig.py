@@ -521,18 +521,17 @@ def memory_station(count: int = 3, **changes: object) -> Station:
         "trigger": TriggerPlan("rigwright", "memory:", lead_us=2000.0),
         "policy": policy,
     }
-    return Station(**{**values, **changes})  # type: ignore[arg-type]
+    return Station(**{**values, **changes})
 
 
 def with_camera(station: Station, name: str, **changes: object) -> Station:
     """The station with one camera changed."""
     cameras = tuple(
-        replace(camera, **changes) if camera.name == name else camera  # type: ignore[arg-type]
-        for camera in station.cameras
+        replace(camera, **changes) if camera.name == name else camera for camera in station.cameras
     )
     return replace(station, cameras=cameras)
 
 
 def with_policy(station: Station, **changes: object) -> Station:
     """The station with another policy."""
-    return replace(station, policy=replace(station.policy, **changes))  # type: ignore[arg-type]
+    return replace(station, policy=replace(station.policy, **changes))

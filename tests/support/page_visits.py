@@ -72,7 +72,7 @@ class Visit:
         self.page.goto(address)
 
     def _asked(self, request: object) -> None:
-        url = str(request.url)  # type: ignore[attr-defined]
+        url = str(request.url)
         if not url.startswith((self.address, "data:", "blob:")):
             self.foreign.append(url)
 

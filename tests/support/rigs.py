@@ -82,7 +82,7 @@ def compact_camera(**changes: object) -> Camera:
         "min_focus_distance_mm": 350.0,
         "body": Body([62.0, 45.0, 32.0], [0.0, 0.0, -30.0], 30.0, 25.0),
     }
-    return Camera(**(values | changes))  # type: ignore[arg-type]
+    return Camera(**(values | changes))
 
 
 def face_limits(**changes: object) -> Limits:
@@ -94,7 +94,7 @@ def face_limits(**changes: object) -> Limits:
         "coverage": Coverage((CoverageTier(2, 0.999), CoverageTier(3, 0.95))),
         "stand_off": StandOff(400.0, 1500.0),
     }
-    return Limits(**(values | changes))  # type: ignore[arg-type]
+    return Limits(**(values | changes))
 
 
 def names(count: int) -> tuple[str, ...]:
@@ -181,4 +181,4 @@ def wall_limits(**changes: object) -> Limits:
         "sight_line_clearance_mm": None,
         "coverage": Coverage(unseen_sigma_mm=1e6),
     }
-    return Limits(**(values | changes))  # type: ignore[arg-type]
+    return Limits(**(values | changes))

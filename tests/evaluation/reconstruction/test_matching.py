@@ -14,7 +14,7 @@ pytest.importorskip("numba")
 pytestmark = pytest.mark.slow  # the kernel is compiled first, which takes longer than the tests
 
 
-def matched(noise: float, off_px: float):  # type: ignore[no-untyped-def]  # noqa: ANN201
+def matched(noise: float, off_px: float):  # noqa: ANN201
     views = scenes.plane_views(noise)
     truth = scenes.true_inverse_depth(views[0])[::4, ::4]
     # One pixel of the widest pair is 1 / (focal length x base).

@@ -70,7 +70,7 @@ def test_wrong_options() -> None:
     with pytest.raises(InputError, match="ending"):
         ExportOptions(image_suffix="png")
     with pytest.raises(InputError, match="choose one of initial, exact, locked"):
-        ExportOptions(pose_prior="free")  # type: ignore[arg-type]
+        ExportOptions(pose_prior="free")
     files = export_files("colmap-text", hand_rig(), ExportOptions(image_suffix=".jpg"))
     assert b"front.jpg" in files["images.txt"]
 

@@ -82,7 +82,7 @@ def test_a_small_picture_is_brightened_when_it_is_dark() -> None:
 def test_files_of_bodies_are_read_and_raw_ones_are_not() -> None:
     data, _ = small_jpeg(edges(1.0), look_at(edges(1.0)))
     given = {"camera_id": "a", "arrived_host_ns": 1, "status": FrameStatus.OK}
-    seen = pixels_of(Frame(**given, encoded=data, media_type="image/jpeg"))  # type: ignore[arg-type]
+    seen = pixels_of(Frame(**given, encoded=data, media_type="image/jpeg"))
     assert seen is not None and seen.shape == (240, 240, 3)
-    raw = Frame(**given, encoded=b"raw", media_type="image/x-nikon-nef")  # type: ignore[arg-type]
+    raw = Frame(**given, encoded=b"raw", media_type="image/x-nikon-nef")
     assert pixels_of(raw) is None

@@ -79,7 +79,7 @@ def test_every_part_setting_and_step_is_told(page: str) -> None:
 
 def test_the_figure_holds_every_solid_where_it_stands(page: str) -> None:
     plan = tslot_plan(3)
-    parts = json.loads(re.search(FIGURES, without_plotly(page), re.DOTALL).group(1))  # type: ignore[union-attr]
+    parts = json.loads(re.search(FIGURES, without_plotly(page), re.DOTALL).group(1))
     solids = plan_solids(plan)
     corners = np.concatenate([np.array(m["at"]).T for m in parts["ways"].values()])
     wanted = np.concatenate([s.corners_mm for s in solids])

@@ -75,7 +75,7 @@ def test_sensors_are_of_the_size_their_pixels_make(catalogue: Catalogue) -> None
             assert width / across == pytest.approx(height / down, rel=0.015), camera.id
         if camera.pitch_um is not None:
             assert 1.0 < camera.pitch_um < 10.0
-            assert 4.0 < camera.diagonal_mm < 45.0, camera.id  # type: ignore[operator]
+            assert 4.0 < camera.diagonal_mm < 45.0, camera.id
 
 
 def test_basler_diagonals_are_those_of_their_sheets(catalogue: Catalogue) -> None:
@@ -103,8 +103,8 @@ def test_raspberry_pi_views_are_those_of_the_sheet(catalogue: Catalogue) -> None
         "rpi-ai": 66.0,
     }.items():
         camera = catalogue.cameras[part_id]
-        lens = catalogue.lenses[camera.fixed_lens]  # type: ignore[index]
-        width = camera.active_size_mm[0]  # type: ignore[index]
+        lens = catalogue.lenses[camera.fixed_lens]
+        width = camera.active_size_mm[0]
         view = 2.0 * np.degrees(np.arctan(width / (2.0 * lens.focal_length_mm)))
         assert view == pytest.approx(view_deg, abs=3.0), part_id
 
@@ -138,7 +138,7 @@ def test_the_1515_profile_bends_as_its_catalogue_says() -> None:
     # 80/20 catalogue 21: 30 inches, 50 pounds in the middle of two supports, .011 inches.
     profile = load_catalogue().profiles["1515"]
     length_mm, load_n = 30 * 25.4, 50 * 4.4482
-    stiffness = 48.0 * profile.elasticity_n_per_mm2 * profile.inertia_x_mm4  # type: ignore[operator]
+    stiffness = 48.0 * profile.elasticity_n_per_mm2 * profile.inertia_x_mm4
     # The example is rounded to a thousandth of an inch: 5 per cent.
     assert load_n * length_mm**3 / stiffness == pytest.approx(0.011 * 25.4, rel=0.05)
 

@@ -191,7 +191,7 @@ def test_a_fixed_camera_may_name_parts_too() -> None:
 def test_the_parts_are_found_again_by_the_name_they_give() -> None:
     catalogue = load_catalogue()
     name = rig_from_mapping(rig(EXAMPLE)).camera.name
-    body, lens = catalogue.parts_of(name)  # type: ignore[misc]
+    body, lens = catalogue.parts_of(name)
     assert (body.id, lens.id) == ("canon-eos-250d", "canon-ef-50-f18-stm")
     assert catalogue.parts_of("camera") is None
     assert all(len(f"{b} {g}") <= 80 for b in catalogue.cameras for g in catalogue.lenses), (

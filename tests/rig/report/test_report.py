@@ -126,7 +126,7 @@ def test_every_section_is_there_and_linked(page: str) -> None:
         }
     )
     places = {a.get("id") for tag, a in elements.found if tag == "div"} - {None}
-    figures = json.loads(re.search(FIGURES, without_plotly(page), re.DOTALL).group(1))  # type: ignore[union-attr]
+    figures = json.loads(re.search(FIGURES, without_plotly(page), re.DOTALL).group(1))
     assert set(figures) == places
 
 

@@ -35,8 +35,8 @@ def header(glb: bytes) -> dict[str, object]:
 
 def test_the_container_is_valid_and_the_nodes_have_names(glb: bytes, design: Design) -> None:
     document = header(glb)
-    assert document["asset"]["version"] == "2.0"  # type: ignore[index]
-    names = {node.get("name") for node in document["nodes"]}  # type: ignore[attr-defined]
+    assert document["asset"]["version"] == "2.0"
+    names = {node.get("name") for node in document["nodes"]}
     wanted = {f"{c.name}/{part}" for c in design.cameras for part in ("body", "lens", "view")}
     assert wanted | {"head"} <= names
 
@@ -81,7 +81,7 @@ def test_views_end_at_the_image_corners(design: Design) -> None:
 def test_a_scene_without_a_mesh(design: Design) -> None:
     names = {
         node.get("name") for node in header(scene_glb(design.cameras, Occluder.none()))["nodes"]
-    }  # type: ignore[attr-defined]
+    }
     assert "head" not in names and "cam01/body" in names
 
 

@@ -69,7 +69,7 @@ def test_faults_can_be_kept_to_given_shots() -> None:
 )
 def test_impossible_faults_are_refused(changes: dict[str, object]) -> None:
     with pytest.raises(InputError) as caught:
-        CameraFaults(**changes)  # type: ignore[arg-type]
+        CameraFaults(**changes)
     assert caught.value.code == "input/camera-faults"
 
 

@@ -35,7 +35,7 @@ def real_head(**changes: object) -> HeadSettings:
         "flip_texture": True,
         "subdivisions": 2,
     }
-    return HeadSettings(**(values | changes))  # type: ignore[arg-type]
+    return HeadSettings(**(values | changes))
 
 
 def ball_with_a_seam(path: Path) -> None:

@@ -12,7 +12,7 @@ from rig.simulation.raytable import RayTables, ray_table, rays_beside
 TOLERANCE_PX = 0.01
 
 
-def projected(table_rays: np.ndarray, camera_matrix: np.ndarray, distortion: np.ndarray):  # type: ignore[no-untyped-def]  # noqa: ANN201
+def projected(table_rays: np.ndarray, camera_matrix: np.ndarray, distortion: np.ndarray):  # noqa: ANN201
     points = np.concatenate([table_rays, np.ones((len(table_rays), 1))], axis=1) * 900.0
     pixels, _ = cv2.projectPoints(points, np.zeros(3), np.zeros(3), camera_matrix, distortion)
     return pixels.reshape(-1, 2)

@@ -43,7 +43,7 @@ def backend_of() -> Iterator[Maker]:
 
     def make(faults: CameraFaults | None = None, **changes: object) -> SimulatedBackend:
         wrong = {} if faults is None else {"cam02": faults}
-        settings = replace(BASE, faults=wrong, **changes)  # type: ignore[arg-type]
+        settings = replace(BASE, faults=wrong, **changes)
         made.append(SimulatedBackend(RIG, settings))
         return made[-1]
 
@@ -257,7 +257,7 @@ def test_a_late_frame_reaches_into_the_next_capture(backend_of: Maker) -> None:
 
 def test_black_incomplete_and_wrong_size_frames(backend_of: Maker) -> None:
     for fault in ("black", "incomplete", "wrong_size"):
-        backend = backend_of(CameraFaults(**{fault: 1.0}))  # type: ignore[arg-type]
+        backend = backend_of(CameraFaults(**{fault: 1.0}))
         _, frames = capture(backend)
         (good,), (bad,) = frames["cam01"], frames["cam02"]
         assert good.pixels is not None
@@ -409,7 +409,7 @@ class QuietBox:
 
 def test_a_box_is_listened_to_from_another_thread_until_closing() -> None:
     box = QuietBox()
-    with SimulatedBackend(RIG, BASE, box) as backend:  # type: ignore[arg-type]
+    with SimulatedBackend(RIG, BASE, box) as backend:
         device = backend.open("cam01")
         device.arm(ArmSpec("c", 1, DEADLINE_S))
         told = report("c", time.monotonic_ns() + 20_000_000, {1: 0.0})

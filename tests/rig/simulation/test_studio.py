@@ -144,7 +144,7 @@ def test_all_cameras_see_the_same_grain(studio: Studio) -> None:
     assert np.corrcoef(views[0].ravel(), views[1].ravel())[0, 1] > 0.97
 
 
-def occluder(studio: Studio):  # type: ignore[no-untyped-def]  # noqa: ANN201
+def occluder(studio: Studio):  # noqa: ANN201
     from geometry.raycast import Occluder
 
     surface = studio.surface

@@ -8,7 +8,7 @@ import urllib.parse
 import urllib.request
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 from browsers import chromium
@@ -28,6 +28,7 @@ NAME = '"><img src=x onerror="window.ran=1"><svg onload="window.ran=1">'
 """What it would do it does within a frame of being made, wherever a page takes it for markup."""
 
 SHOTS = 20
+JSON = dict[str, Any]
 
 
 @pytest.fixture(scope="module")
@@ -57,18 +58,20 @@ def visits(address: str) -> Iterator[tuple[Visit, Visit]]:
         yield Visit(browser, address), Visit(browser, address, 820)
 
 
-def read(address: str) -> object:
+def read(address: str) -> JSON:
     with urllib.request.urlopen(address) as answer:  # noqa: S310 - the service of this test
-        return json.load(answer)
+        found: JSON = json.load(answer)
+        return found
 
 
-def sent(address: str, content: object) -> object:
+def sent(address: str, content: object) -> JSON:
     """The answer to a POST of a file, or of anything that becomes JSON."""
     data = content if isinstance(content, bytes) else json.dumps(content).encode()
     kind = "application/octet-stream" if isinstance(content, bytes) else "application/json"
     request = urllib.request.Request(address, data, {"Content-Type": kind})  # noqa: S310 - as below
     with urllib.request.urlopen(request) as answer:  # noqa: S310 - the service of this test
-        return json.load(answer)
+        found: JSON = json.load(answer)
+        return found
 
 
 def pulses(box: FakeTrigger) -> int:
@@ -111,7 +114,7 @@ def test_a_capture_is_seen_by_everybody_at_the_rig(
     one.page.locator(".sheet img").nth(1).wait_for()
     shown = one.page.locator(".result h2").inner_text()
     captures = read(f"{address}v1/captures")
-    assert [item["id"] for item in captures["items"]] == [shown]  # type: ignore[index]
+    assert [item["id"] for item in captures["items"]] == [shown]
     assert one.page.locator("h1").inner_text() == NAME
     nothing_ran(one)
     one.sound()
@@ -131,10 +134,10 @@ def test_a_camera_is_aimed_on_the_screen_and_a_capture_goes_first(
     one.see("degrees to the left")
     assert first.locator("svg .cross").count() == 2 and first.locator("svg .found").count() == 1
     one.sound()
-    before = len(read(f"{address}v1/captures")["items"])  # type: ignore[index]
+    before = len(read(f"{address}v1/captures")["items"])
     one.press("Fire")
     one.page.locator(".result .state", has_text="complete").first.wait_for()
-    assert len(read(f"{address}v1/captures")["items"]) == before + 1  # type: ignore[index]
+    assert len(read(f"{address}v1/captures")["items"]) == before + 1
     shown = first.locator("img").get_attribute("src")
     one.page.wait_for_function(
         "was => document.querySelector('.live img').getAttribute('src') !== was", arg=shown
@@ -144,12 +147,12 @@ def test_a_camera_is_aimed_on_the_screen_and_a_capture_goes_first(
 
 def test_a_countdown_can_be_stopped(visits: tuple[Visit, Visit], address: str) -> None:
     one, _ = visits
-    before = len(read(f"{address}v1/captures")["items"])  # type: ignore[index]
+    before = len(read(f"{address}v1/captures")["items"])
     one.page.get_by_label("Countdown, s").fill("30")
     one.press("Fire")
     one.page.get_by_role("button", name="press to stop").click()
     one.page.get_by_role("button", name="Fire", exact=True).wait_for()
-    assert len(read(f"{address}v1/captures")["items"]) == before  # type: ignore[index]
+    assert len(read(f"{address}v1/captures")["items"]) == before
 
 
 def told(**result: object) -> dict[str, object]:
@@ -178,7 +181,7 @@ def test_markup_in_a_name_is_a_name(visits: tuple[Visit, Visit], address: str) -
     scan = (ROOT / "examples/wall/targets.xyz").read_bytes()
     where = f"{address}v1/scans?filename={file}&units=m&up=%2Bz&front=-y&subject=object"
     kept = sent(where, scan)
-    assert kept["filename"] == f"{NAME}.xyz"  # type: ignore[index]
+    assert kept["filename"] == f"{NAME}.xyz"
     plate = {"name": "plate", "columns": 5, "rows": 4, "square_mm": 9.0, "marker_mm": 6.0}
     plate["dictionary"] = "DICT_4X4_50"
     targets = {"schema": "rigwright.targets/1", "name": NAME, "plates": [plate]}
@@ -211,7 +214,7 @@ def test_one_fires_the_other_is_told_and_a_crash_fires_nothing_again(
     visits: tuple[Visit, Visit], serving: Serving, box: FakeTrigger
 ) -> None:
     """As soon after each other as two people can: neither page has heard of the other's."""
-    before = len(read(f"{serving.address}v1/captures")["items"])  # type: ignore[index]
+    before = len(read(f"{serving.address}v1/captures")["items"])
     was = pulses(box)
     for visit, name in zip(visits, ("anna", "bert"), strict=True):
         visit.go("Rig")
@@ -232,13 +235,13 @@ def test_one_fires_the_other_is_told_and_a_crash_fires_nothing_again(
         visit.page.locator("#service.good").wait_for()
         visit.see("Trigger box: ready")
     one.see("was interrupted after it may have fired")
-    newest, *older = read(f"{serving.address}v1/captures")["items"]  # type: ignore[index]
+    newest, *older = read(f"{serving.address}v1/captures")["items"]
     assert (newest["status"], len(older)) == ("interrupted", before)
     fired = pulses(box)
     assert fired <= was + SHOTS
     one.page.wait_for_timeout(1500)  # thrice the time between shots, and a look of every page
     assert pulses(box) == fired
-    assert len(read(f"{serving.address}v1/captures")["items"]) == before + 1  # type: ignore[index]
+    assert len(read(f"{serving.address}v1/captures")["items"]) == before + 1
     for visit in visits:
         visit.faults.clear()  # the browser tells of what nobody answered
 

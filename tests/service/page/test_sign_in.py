@@ -46,7 +46,7 @@ def test_who_has_a_key_comes_in_and_may_what_it_says(
         one.go("Rig")
         one.see("Trigger box: ready")
         links = one.page.get_by_role("navigation").get_by_role("link").all()
-        assert len({link.bounding_box()["y"] for link in links}) == 1  # type: ignore[index]
+        assert len({link.bounding_box()["y"] for link in links}) == 1
         one.press("Sign out")
         one.see("Your key")
         assert one.page.get_by_text("Trigger box").count() == 0

@@ -177,7 +177,7 @@ def test_symmetry_speaks_of_the_mean_and_the_median() -> None:
 
 
 def body_of(changes: dict[str, object], *positions: tuple[float, float, float]) -> dict[str, float]:
-    return violation(problem_of(replace(OFF, **changes), *positions), body_constraints)  # type: ignore[arg-type]
+    return violation(problem_of(replace(OFF, **changes), *positions), body_constraints)
 
 
 def test_a_box_is_left_by_the_spheres_of_the_body_too() -> None:
@@ -204,7 +204,7 @@ def test_one_allowed_zone_is_enough_and_the_nearest_is_taken() -> None:
     ],
 )
 def test_forbidden_zones_are_broken_inside_and_hold_outside(zone: object) -> None:
-    zones = Zones(forbidden=(zone,))  # type: ignore[arg-type]
+    zones = Zones(forbidden=(zone,))
     assert body_of({"zones": zones}, A)["zone_forbidden"] > 20.0
     assert body_of({"zones": zones}, (0.0, -800.0, -500.0))["zone_forbidden"] == 0.0
 
@@ -333,4 +333,4 @@ def test_fixed_cameras_have_no_rows_about_rays() -> None:
     rows = of_rays(replace(problem, cameras=cameras), None)
     assert rows
     for row in rows:
-        assert set(row.block.camera.tolist()) == {1}  # type: ignore[attr-defined]
+        assert set(row.block.camera.tolist()) == {1}

@@ -44,7 +44,7 @@ def test_every_option_is_explained(name: str) -> None:
 
 @pytest.mark.parametrize("module", [aravis, genicam, gphoto2])
 def test_the_page_gives_the_command_the_error_gives(module: object) -> None:
-    assert f"`{module.INSTALL}`" in PAGE  # type: ignore[attr-defined]
+    assert f"`{module.INSTALL}`" in PAGE
 
 
 def test_the_extras_that_are_named_exist() -> None:

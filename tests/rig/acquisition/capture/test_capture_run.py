@@ -32,7 +32,7 @@ from rig.acquisition.station.spec import Interlock, TriggerPlan
 
 
 def disarmed(bench: object) -> bool:
-    devices = bench.devices  # type: ignore[attr-defined]
+    devices = bench.devices
     return devices.box.armed is None and not any(
         camera.armed for camera in devices.backend.cameras.values()
     )
@@ -140,7 +140,7 @@ def test_an_absent_camera_is_tried_again_at_each_capture(bench: BenchMaker) -> N
     assert made.rig.health().cameras["cam02"].problem == "it is not plugged in"
     with pytest.raises(DeviceError, match="cam02: it is not plugged in"):
         made.rig.capture(made.session, "smile")
-    made.devices.backend._scripts = {}  # type: ignore[union-attr]
+    made.devices.backend._scripts = {}
     assert made.rig.capture(made.session, "smile").record.state == "complete"
 
 
@@ -150,7 +150,7 @@ def test_an_unplugged_camera_is_opened_again(bench: BenchMaker) -> None:
     assert result.record.missing == {"cam02": [1]}
     assert "the camera is unplugged" in result.record.faults[0].text
     assert result.error is not None and result.error.code == "device/capture-partial"
-    made.devices.backend._scripts = {}  # type: ignore[union-attr]
+    made.devices.backend._scripts = {}
     assert made.rig.capture(made.session, "two").record.state == "complete"
 
 
@@ -184,10 +184,10 @@ def test_an_interlock_that_opens_after_arming(bench: BenchMaker) -> None:
     arm = made.box.arm
 
     def arm_and_open(request: object) -> None:
-        arm(request)  # type: ignore[arg-type]
+        arm(request)
         made.box.script = BoxScript(open_interlock=True)
 
-    made.box.arm = arm_and_open  # type: ignore[method-assign]
+    made.box.arm = arm_and_open
     with pytest.raises(InterlockError):
         made.rig.capture(made.session, "smile")
     assert disarmed(made)
@@ -200,7 +200,7 @@ def test_a_dry_run_does_all_but_fire(bench: BenchMaker) -> None:
     assert done.ready == ("cam01", "cam02", "cam03") and not done.faults
     assert not made.box.fired and disarmed(made)
     assert len(made.box._requests) == 1, "the box was armed"
-    assert all(camera.arms == 1 for camera in made.devices.backend.cameras.values())  # type: ignore[union-attr]
+    assert all(camera.arms == 1 for camera in made.devices.backend.cameras.values())
 
 
 def test_a_self_test_names_each_part(bench: BenchMaker, tmp_path: Path) -> None:
@@ -436,7 +436,7 @@ def test_closing_lets_everything_go(bench: BenchMaker) -> None:
     made.rig.close()
     made.rig.close()
     assert made.box.closed and made.devices.closed
-    assert all(camera.closed for camera in made.devices.backend.cameras.values())  # type: ignore[union-attr]
+    assert all(camera.closed for camera in made.devices.backend.cameras.values())
     bench()
 
 

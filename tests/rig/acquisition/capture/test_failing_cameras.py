@@ -117,7 +117,7 @@ def test_a_picture_that_nothing_can_code_costs_its_camera_only(
 
     usual = staging.filed
 
-    def fails(frame, facts, policy):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+    def fails(frame, facts, policy):  # noqa: ANN001, ANN202
         if facts.unique_id == "one/cam02/1":
             raise ValueError("no such mode")
         return usual(frame, facts, policy)
@@ -135,7 +135,7 @@ def test_a_record_that_contradicts_itself_cannot_be_made(
 ) -> None:
     from rig.acquisition.session import staging
 
-    def forgets(captured, evidence, files, numbering, **more):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN003, ANN202
+    def forgets(captured, evidence, files, numbering, **more):  # noqa: ANN001, ANN003, ANN202
         return make_record(captured, evidence, files[1:], numbering, **more)
 
     monkeypatch.setattr(staging, "make_record", forgets)

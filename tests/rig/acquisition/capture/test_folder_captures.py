@@ -49,7 +49,7 @@ def jpeg(at: datetime | None, seed: int, serial: str = "", scale: int = 1) -> by
 def station(root: Path, **more: object) -> Station:
     for name in CAMERAS:
         (root / name).mkdir(parents=True, exist_ok=True)
-    plans = tuple(CameraPlan(name, "folder", name, **more) for name in CAMERAS)  # type: ignore[arg-type]
+    plans = tuple(CameraPlan(name, "folder", name, **more) for name in CAMERAS)
     options = {"folder": {"root": str(root), "settle_s": 0.05}}
     made = Station("tethered", plans, backend_options=options)
     return with_policy(made, frame_deadline_s=1.0, settle_s=0.15, min_free_mb=0.0)

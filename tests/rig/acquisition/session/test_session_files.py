@@ -77,9 +77,9 @@ def test_every_kind_of_picture_in_every_format(form: ImageFormat, pixels: np.nda
     assert tags[Base.DateTimeOriginal] == "2026:11:22 09:05:07"
     assert tags[Base.SubsecTimeOriginal] == "123456"
     assert tags[Base.OffsetTimeOriginal] == "-03:00"
-    assert float(tags[Base.ExposureTime]) == pytest.approx(0.004)  # type: ignore[arg-type]
-    assert float(tags[Base.FNumber]) == 11.0  # type: ignore[arg-type]
-    assert float(tags[Base.FocalLength]) == 50.0  # type: ignore[arg-type]
+    assert float(tags[Base.ExposureTime]) == pytest.approx(0.004)
+    assert float(tags[Base.FNumber]) == 11.0
+    assert float(tags[Base.FocalLength]) == 50.0
     assert tags[Base.ISOSpeedRatings] == 100
     assert tags[Base.ImageUniqueID] == "smile/cam01/1"
     back = cv2.imdecode(np.frombuffer(file.data, np.uint8), cv2.IMREAD_UNCHANGED)

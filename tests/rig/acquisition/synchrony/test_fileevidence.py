@@ -53,7 +53,7 @@ def shots(number: int, at: datetime, count: int = 1, apart_s: float = 1.0) -> tu
 def sorted_one(
     evidence: FileEvidence, number: int, at: datetime, *frames: Frame, **more: object
 ) -> Pairing:
-    given = FileDelivery("cam", frames, shots(number, at), 0, **more)  # type: ignore[arg-type]
+    given = FileDelivery("cam", frames, shots(number, at), 0, **more)
     return evidence.sort([given])["cam"][0]
 
 

@@ -81,7 +81,7 @@ def received(frames: Sequence[Frame], shots: int = 3, **changes: object) -> Came
         "lag_us": LAG_US,
         "lag_tolerance_us": TOLERANCE_US,
     }
-    return CameraFrames(**{**values, **changes})  # type: ignore[arg-type]
+    return CameraFrames(**{**values, **changes})
 
 
 def burst(shots: int = 3, first_counter: int = 65534, off_us: float = 0.0) -> list[Frame]:
@@ -95,11 +95,11 @@ def burst(shots: int = 3, first_counter: int = 65534, off_us: float = 0.0) -> li
 
 
 def kinds(result: object) -> set[FaultKind]:
-    return {fault.kind for fault in result.faults}  # type: ignore[attr-defined]
+    return {fault.kind for fault in result.faults}
 
 
 def truths(result: object) -> dict[int, str]:
-    return {one.shot: one.frame.metadata["truth"] for one in result.pairs}  # type: ignore[attr-defined]
+    return {one.shot: one.frame.metadata["truth"] for one in result.pairs}
 
 
 ALL_RIGHT = {1: "1", 2: "2", 3: "3"}
@@ -151,7 +151,7 @@ def test_a_picture_delivered_twice_is_kept_once() -> None:
     assert truths(result) == ALL_RIGHT
     assert kinds(result) == {FaultKind.DUPLICATE}
     broken = replace(two, status=FrameStatus.INCOMPLETE)
-    assert pair(received([one, broken, two, three])).pair(2).frame.status is FrameStatus.OK  # type: ignore[union-attr]
+    assert pair(received([one, broken, two, three])).pair(2).frame.status is FrameStatus.OK
 
 
 def test_two_exposures_about_one_shot_cannot_be_told_apart() -> None:

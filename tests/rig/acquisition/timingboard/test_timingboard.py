@@ -110,7 +110,7 @@ def cover(picture: np.ndarray, corners: np.ndarray) -> np.ndarray:
         (lambda: small(photograph(0.0, 2000.0, "Mono8", "cam01")), "board-too-small"),
     ],
 )
-def test_a_board_that_cannot_be_read_is_named(picture, code: str) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
+def test_a_board_that_cannot_be_read_is_named(picture, code: str) -> None:  # noqa: ANN001
     with pytest.raises(InputError) as caught:
         read_board(picture(), BOARD)
     assert caught.value.code == f"input/{code}"
@@ -118,7 +118,7 @@ def test_a_board_that_cannot_be_read_is_named(picture, code: str) -> None:  # ty
 
 
 def small(picture: np.ndarray) -> np.ndarray:
-    return cv2.resize(picture, None, fx=0.4, fy=0.4, interpolation=cv2.INTER_AREA)  # type: ignore[return-value]
+    return cv2.resize(picture, None, fx=0.4, fy=0.4, interpolation=cv2.INTER_AREA)
 
 
 @pytest.mark.slow
@@ -146,7 +146,7 @@ def test_linear_light_inverts_the_srgb_curve() -> None:
 )
 def test_boards_that_cannot_be_are_refused(changes: dict[str, object]) -> None:
     with pytest.raises(InputError, match="makes no board"):
-        replace(BOARD, **changes)  # type: ignore[arg-type]
+        replace(BOARD, **changes)
 
 
 def test_the_printed_face_has_its_markers_where_the_board_says() -> None:

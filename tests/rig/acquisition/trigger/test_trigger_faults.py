@@ -159,7 +159,7 @@ def test_opening_that_resets_the_board() -> None:
 @pytest.mark.parametrize("over", ["pty", "tcp"])
 def test_unplugged_while_idle_and_plugged_in_again(over: str, tmp_path: Path) -> None:
     where = {"port": 0} if over == "tcp" else {"link": tmp_path / "box"}
-    with start_fake(**where) as fake, opened(fake.url) as driver:  # type: ignore[arg-type]
+    with start_fake(**where) as fake, opened(fake.url) as driver:
         fire_whole(driver, "a")
         fake.server.unplug()
         wait_until(lambda: driver.health().state in GONE)
@@ -390,7 +390,7 @@ def test_an_echo_on_the_line() -> None:
 
 @pytest.mark.parametrize("way", ["to_box", "to_host"])
 def test_four_kilobytes_of_noise(way: str) -> None:
-    incident = Incident(way, "noise", containing="cap=a")  # type: ignore[arg-type]
+    incident = Incident(way, "noise", containing="cap=a")
     with (
         start_fake() as fake,
         FaultProxy(fake.url, PtyEndpoint(), ProxyScript(incidents=(incident,))) as proxy,

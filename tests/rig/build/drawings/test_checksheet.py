@@ -106,7 +106,7 @@ def test_picture_and_tape_see_every_turn_and_shift_and_the_level_those_it_can(ki
 
 @pytest.mark.parametrize("made", [tslot_plan, plate_plan])
 def test_the_sheet_says_what_the_list_says(made: object) -> None:
-    one = made()  # type: ignore[operator]
+    one = made()
     text = " ".join(line for page in read_sheet.pdf_lines(pdf_bytes(check_sheets(one), "x"))
                     for line in page)  # fmt: skip
     for row in rows(one).values():

@@ -51,8 +51,7 @@ def test_where_lines_are_everywhere_a_name_still_keeps_off_figures() -> None:
 def test_the_box_of_a_text_is_where_it_is_written(anchor: str, share: float) -> None:
     wide = text_width_mm("cam05", 2.0)
     lying, upright = (
-        text_box(Text("cam05", 10.0, 20.0, 2.0, anchor, angle_deg=angle))  # type: ignore[arg-type]
-        for angle in (0.0, 90.0)
+        text_box(Text("cam05", 10.0, 20.0, 2.0, anchor, angle_deg=angle)) for angle in (0.0, 90.0)
     )
     assert np.allclose(lying, [[10.0 - share * wide, 20.0], [10.0 + (1.0 - share) * wide, 22.0]])
     assert np.allclose(upright, [[8.0, 20.0 - share * wide], [10.0, 20.0 + (1.0 - share) * wide]])

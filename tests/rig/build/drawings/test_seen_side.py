@@ -16,7 +16,7 @@ DEPTH_MM = 1.0
 
 @pytest.mark.parametrize("made", [tslot_plan, plate_plan])
 def test_views_are_a_third_angle_projection(made: object) -> None:
-    front, top, side = views_of(made().structure)  # type: ignore[operator]
+    front, top, side = views_of(made().structure)
     # The top view is the front folded back, the right side the front folded to the right.
     assert np.allclose(top.axes[0], front.axes[0]) and np.allclose(top.axes[2], front.axes[1])
     assert np.allclose(side.axes[1], front.axes[1]) and np.allclose(side.axes[2], front.axes[0])
@@ -33,7 +33,7 @@ def test_left_on_the_front_view_is_left_for_whoever_sets_the_cameras(
     made: object, sign: float
 ) -> None:
     """From behind, a plate hides its cameras, and left and right are changed on it."""
-    plan = made()  # type: ignore[operator]
+    plan = made()
     places = {m.name: float(m.camera.pose.position_rig_mm[0]) for m in plan.mounts}
     drawn = marks(plan)
     for one in places:

@@ -26,7 +26,7 @@ FAR = np.array([0.0, 3000.0, 0.0])
 def around(**changes: object) -> Surroundings:
     limits = replace(face_limits(), body_clearance_mm=5.0, sight_line_clearance_mm=10.0)
     values = {"zones": (), "floor_z_mm": -1200.0, "clearance_mm": 2.0} | changes
-    return Surroundings(face(50, 100), limits, **values)  # type: ignore[arg-type]
+    return Surroundings(face(50, 100), limits, **values)
 
 
 def cube(owner: str, at: object, size: float = 10.0, kind: str = "member") -> Solid:

@@ -26,7 +26,7 @@ SINGLE = tuple(p for p in PROFILES if p.height_mm == p.width_mm)
 
 @pytest.mark.parametrize("profile", PROFILES, ids=lambda p: p.id)
 @pytest.mark.parametrize("kind", ["corner", "pivot", "head-plate"])
-def test_every_profile_has_brackets_of_its_own_series(profile, kind: str) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
+def test_every_profile_has_brackets_of_its_own_series(profile, kind: str) -> None:  # noqa: ANN001
     found = bracket_for(profile, kind, CATALOGUE)
     assert found.kind == kind
     assert profile.series in found.series
@@ -43,7 +43,7 @@ def test_a_bracket_of_unknown_size_is_not_taken() -> None:
 
 
 @pytest.mark.parametrize("profile", PROFILES, ids=lambda p: p.id)
-def test_nut_and_screw_have_the_profile_s_thread(profile) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
+def test_nut_and_screw_have_the_profile_s_thread(profile) -> None:  # noqa: ANN001
     nut = CATALOGUE.fasteners[t_nut_for(profile, CATALOGUE)]
     screw = CATALOGUE.fasteners[screw_for(profile.bolt, CATALOGUE)]
     assert nut.kind == "t-nut"
@@ -67,7 +67,7 @@ def test_a_cap_screw_is_taken_before_a_stud() -> None:
 
 
 @pytest.mark.parametrize("profile", SINGLE, ids=lambda p: p.id)
-def test_a_post_on_one_screw_would_turn(profile) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
+def test_a_post_on_one_screw_would_turn(profile) -> None:  # noqa: ANN001
     with pytest.raises(InputError, match=r"would turn on its one screw.*choose 2040"):
         plate_of(profile, 8.0, "aluminium", CATALOGUE)
 
@@ -81,7 +81,7 @@ def test_a_plate_has_the_parts_of_its_double_profile() -> None:
 
 
 @pytest.mark.parametrize("profile", SINGLE, ids=lambda p: p.id)
-def test_an_outrigger_is_of_one_series(profile) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
+def test_an_outrigger_is_of_one_series(profile) -> None:  # noqa: ANN001
     head = HeadKind.named("generic-ball-25", CATALOGUE)
     made = outrigger_of(profile, head, CATALOGUE)
     for bracket, kind in (

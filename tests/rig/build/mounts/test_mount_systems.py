@@ -79,7 +79,7 @@ def test_everything_named_is_part_of_the_structure(kind: str) -> None:
 
 def _names(structure: Structure) -> set[str]:
     groups = (structure.members, structure.plates, structure.wedges, structure.parts)
-    return {part.id for group in groups for part in group}  # type: ignore[attr-defined]
+    return {part.id for group in groups for part in group}
 
 
 @pytest.mark.parametrize("kind", KINDS)

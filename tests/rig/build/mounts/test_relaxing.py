@@ -42,7 +42,7 @@ def figures(sigma_mm: float, second_views: float) -> Figures:
 class Asked:
     """Stands for the rounder: keeps what it is given, moves every mount, asks what that costs."""
 
-    def __init__(self, _subject, _limits, cameras, mounts, *, spare, tell, cancel) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
+    def __init__(self, _subject, _limits, cameras, mounts, *, spare, tell, cancel) -> None:  # noqa: ANN001
         Asked.last = self
         self.cameras, self.mounts, self.spare = cameras, mounts, spare
         self.tell, self.cancel = tell, cancel
@@ -51,7 +51,7 @@ class Asked:
 
     last: Asked
 
-    def relax(self, loss, most: float) -> float:  # type: ignore[no-untyped-def]  # noqa: ANN001
+    def relax(self, loss, most: float) -> float:  # noqa: ANN001
         self.most = most
         self.losses.append(loss(self.cameras))
         self.mounts = tuple(
@@ -76,8 +76,8 @@ def run(
     monkeypatch.setattr(relaxing, "Rounder", Asked)
     return relaxed(
         rig(),
-        None,  # type: ignore[arg-type]
-        None,  # type: ignore[arg-type]
+        None,
+        None,
         steps=(5.0, 0.5),
         spare=0.8,
         tell=lambda _: None,

@@ -59,8 +59,8 @@ def rounder(
         design_points = Points()
 
     return Rounder(
-        Subject(),  # type: ignore[arg-type]
-        None,  # type: ignore[arg-type]
+        Subject(),
+        None,
         tuple(network.cameras),
         mounts,
         spare=spare,

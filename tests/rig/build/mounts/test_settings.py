@@ -58,7 +58,7 @@ def test_a_setting_that_makes_no_sense_is_refused(wrong: dict[str, object]) -> N
     fields = {"name": "s", "unit": "mm", "value": 0.0, "step": 1.0, "low": -1.0, "high": 1.0}
     fields["measured_from"] = "here"
     with pytest.raises(InputError, match="setting s"):
-        Setting(**(fields | wrong))  # type: ignore[arg-type]
+        Setting(**(fields | wrong))
 
 
 @given(st.lists(st.floats(-1.0, 1.0), min_size=3, max_size=3), st.floats(-360.0, 360.0))
@@ -85,7 +85,7 @@ def test_a_link_slides_or_turns_after_its_transform() -> None:
 def test_a_link_that_moves_needs_axis_and_setting(wrong: dict[str, object]) -> None:
     fields = {"transform": np.eye(4), "motion": Motion.SLIDE, "axis": np.eye(3)[0], "setting": "x"}
     with pytest.raises(InputError, match="lacks axis or setting"):
-        Link(**(fields | wrong))  # type: ignore[arg-type]
+        Link(**(fields | wrong))
 
 
 def test_a_pose_survives_its_matrix() -> None:

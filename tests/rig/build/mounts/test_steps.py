@@ -42,7 +42,7 @@ def structure(**parts: object) -> Structure:
     nothing: dict[str, object] = dict.fromkeys(
         ("members", "plates", "wedges", "parts", "joints", "solids"), ()
     )
-    return Structure(**(nothing | parts))  # type: ignore[arg-type]
+    return Structure(**(nothing | parts))
 
 
 def mount(name: str, *carried_by: str, made: bool = False) -> CameraMount:

@@ -50,7 +50,7 @@ def test_what_a_structure_is_made_of_cannot_be_changed() -> None:
     with pytest.raises(ValueError, match="read-only"):
         member(np.zeros((2, 3))).axis_mm[0, 0] = 1.0
     with pytest.raises(FrozenInstanceError):
-        solid.owner = "other"  # type: ignore[misc]
+        solid.owner = "other"
     cutout = np.zeros((4, 2))
     plate = Plate("p", "wood", 8.0, np.eye(4), np.zeros((4, 2)), (), (cutout,))
     with pytest.raises(ValueError, match="read-only"):

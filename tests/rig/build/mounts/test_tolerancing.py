@@ -43,8 +43,8 @@ def tolerancer(
     monkeypatch.setattr(tolerancing, "MountNetwork", lambda *_: network)
     cameras = tuple(mount.camera for mount in mounts)
     return Tolerancer(
-        None,  # type: ignore[arg-type]
-        None,  # type: ignore[arg-type]
+        None,
+        None,
         cameras,
         mounts,
         tell=tell,

@@ -30,7 +30,7 @@ CATALOGUE = load_catalogue()
 MASSES = Masses(CATALOGUE)
 X, Y, Z = np.eye(3)
 PER_M = float(CATALOGUE.profiles["2020"].mass_kg_per_m or 0.0)
-HEAD_KG = float(CATALOGUE.find("generic-ball-25")[1].mass_g or 0.0) / 1e3  # type: ignore[union-attr]
+HEAD_KG = float(CATALOGUE.find("generic-ball-25")[1].mass_g or 0.0) / 1e3
 DATUM = np.array([0.0, 900.0, 1200.0])
 
 
@@ -131,7 +131,7 @@ def test_some_mount_needs_longer_feet() -> None:
 
 
 def _stances(holding: object, masses: Masses) -> tuple[Stance, ...]:
-    built = holding.build()  # type: ignore[attr-defined]
+    built = holding.build()
     return stances(built.structure, built.mounts, AROUND.datum_mm, masses)
 
 
