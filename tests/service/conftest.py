@@ -6,21 +6,17 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+import counting_job
+import live_server
 import pytest
 import trimesh
+from service_helpers import HERE, ROOT, LiveServer, StartServer, TestClient
 
-HERE = Path(__file__).parent
-sys.path.insert(0, str(HERE))
-
-import counting_job  # noqa: E402 - found by the line above, like the next two
-import live_server  # noqa: E402
-from service_helpers import ROOT, LiveServer, StartServer, TestClient  # noqa: E402
-
-from service.api.context import Service  # noqa: E402
-from service.jobs.process import ProcessEngine  # noqa: E402
-from service.kinds.queued import QUEUED  # noqa: E402
-from service.settings import read_settings  # noqa: E402
-from service.store import Store  # noqa: E402
+from service.api.context import Service
+from service.jobs.process import ProcessEngine
+from service.kinds.queued import QUEUED
+from service.settings import read_settings
+from service.store import Store
 
 
 @pytest.fixture(autouse=True)
