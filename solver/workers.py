@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing as mp
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from multiprocessing.queues import Queue
 from multiprocessing.synchronize import Event
@@ -86,13 +86,20 @@ class _Processes:
             for _ in range(count):
                 self.pool.submit(silent)
 
-    def attend(self, futures: Sequence[Future[Any]], listen: Listener, cancel: CancelToken) -> None:
-        """Pass on progress until all are done or the work is cancelled."""
-        pending = set(futures)
+    def attend(
+        self, futures: Mapping[int, Future[Any]], listen: Listener, cancel: CancelToken
+    ) -> None:
+        """Pass on progress of the jobs with these indices until all are done, or it is cancelled.
+
+        What a job of an earlier batch told last may come after its result, and is for nobody.
+        """
+        pending = set(futures.values())
         while pending:
             done, pending = wait(pending, timeout=_POLL_S, return_when=FIRST_COMPLETED)
             while not self.messages.empty():
-                listen(*self.messages.get())
+                told = self.messages.get()
+                if told[0] in futures:
+                    listen(*told)
             for future in done:
                 future.result()
             if cancel.is_set():
@@ -138,9 +145,9 @@ class Workers(Closing):
         if self.count == 1 or len(jobs) <= 1:
             return _run_here(jobs, listen, cancel)
         processes = self._begun()
-        futures = [processes.pool.submit(_run_in_worker, job) for job in jobs]
+        futures = {job.index: processes.pool.submit(_run_in_worker, job) for job in jobs}
         processes.attend(futures, listen, cancel)
-        return [f.result() for f in futures]
+        return [f.result() for f in futures.values()]
 
     def _begun(self) -> _Processes:
         if self._processes is None:

@@ -140,7 +140,7 @@ def _blocks(mesh: SurfaceMesh, unseen: Bools, first: int) -> _Piece:
 
 
 def sheet_corners(sizes: Ints) -> Ints:
-    """Where rectangles (P, 2) begin on the smallest square sheet on which they find room, (P, 2).
+    """Where rectangles (P, 2) begin on a square sheet, about as small as they find room on, (P, 2).
 
     A long strip would have to be made smaller where a square needs not.
     """

@@ -56,11 +56,11 @@ def filtered(search: Search, count: int, cancel: CancelToken) -> Ints:
     network = np.arange(len(search.candidates))
     while np.count_nonzero(network < search.candidates.free) > count:
         go_on(cancel)
-        network = np.delete(network, _missed_least(search, network))
+        network = np.delete(network, _missed_least(search, network, cancel))
     return network
 
 
-def _missed_least(search: Search, network: Ints) -> int:
+def _missed_least(search: Search, network: Ints, cancel: CancelToken) -> int:
     """Place in ``network`` of the free camera to be taken out next."""
     free = network < search.candidates.free
     crowded = search.too_close[np.ix_(network, network)]
@@ -70,5 +70,10 @@ def _missed_least(search: Search, network: Ints) -> int:
         at = np.flatnonzero(worth)
         return int(at[np.argmin(search.costs_without(network, at))])
     at = np.flatnonzero(free)
-    broken = np.array([search.score(np.delete(network, k))[0] for k in at])
+    broken = np.zeros(len(at), dtype=np.int64)
+    # Without these rules no camera that is taken out can break any.
+    if search.near is not None or search.candidates.matches is not None:
+        for k, place in enumerate(at):
+            go_on(cancel)
+            broken[k] = search.broken(np.delete(network, place))
     return int(at[np.lexsort((search.costs_without(network, at), broken))[0]])

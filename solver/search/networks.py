@@ -99,12 +99,18 @@ class Search:
 
     def score(self, network: Ints) -> tuple[int, float]:
         """Rules broken and cost of one network."""
-        pool = self.candidates
-        if pool.matches is not None:
-            broken = int(self._broken_with_each(network[:-1])[network[-1]])
-        else:
-            broken = self._broken(network)
-        return broken, self._cost(network)
+        return self.broken(network), self._cost(network)
+
+    def broken(self, network: Ints) -> int:
+        """How many rules about its pairs of cameras one network breaks."""
+        if self.candidates.matches is not None:
+            return int(self._broken_with_each(network[:-1])[network[-1]])
+        among = self.too_close[network][:, network]
+        broken = int(np.triu(among, 1).sum())
+        # One camera alone has no neighbour that could be too far away.
+        if self.near is not None and len(network) > 1:
+            broken += int((~self.near[network][:, network].any(axis=1)).sum())
+        return broken
 
     def _cost(self, network: Ints) -> float:
         pool = self.candidates
@@ -157,14 +163,6 @@ class Search:
     def _rough(self) -> _Rough:
         return _Rough.of(self.candidates)
 
-    def _broken(self, network: Ints) -> int:
-        """Rules that a network breaks, those about matches apart."""
-        among = self.too_close[network][:, network]
-        broken = int(np.triu(among, 1).sum())
-        if self.near is not None:
-            broken += int((~self.near[network][:, network].any(axis=1)).sum())
-        return broken
-
     def _broken_with_each(self, rest: Ints) -> Ints:
         among = self.too_close[rest]
         broken = among.sum(axis=0) + int(np.triu(among[:, rest], 1).sum())
@@ -204,8 +202,8 @@ class Search:
         known = self._best_additions.get(rest.tobytes())
         if known is None:
             broken, cost = self.scores_with_each(rest)
-            # What lies within the rounding of the best is weighed exactly.
-            close = np.flatnonzero(cost <= cost.min() * (1.0 + ROUGH))
+            # What the rounding of both may hide is weighed exactly.
+            close = np.flatnonzero(cost <= cost.min() * (1.0 + 2.0 * ROUGH))
             exact = [self._cost(np.append(rest, at)) for at in close]
             best = int(np.argmin(exact))
             known = int(close[best]), (int(broken[close[best]]), exact[best])

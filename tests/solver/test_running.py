@@ -10,6 +10,7 @@ from functools import cache
 import numpy as np
 import pytest
 import rigs
+from chatty import Chatty
 
 from common.errors import CancelledError
 from common.progress import NeverCancelled
@@ -190,6 +191,17 @@ def test_results_come_in_the_order_of_their_jobs_whatever_the_workers() -> None:
     assert len(here) == len(apart) == 2
     for one, other in zip(here, apart, strict=True):
         assert one.values.tobytes() == other.values.tobytes()
+
+
+def test_what_a_job_tells_last_is_heard_by_no_later_batch() -> None:
+    wrong = []
+    with Workers(2) as workers:
+        for batch in range(12):
+            jobs = [Chatty(2 * batch), Chatty(2 * batch + 1)]
+            mine = {job.index for job in jobs}
+            found = workers.run(jobs, lambda job, *_, mine=mine: wrong.extend({job} - mine), NEVER)
+            assert found == sorted(mine)
+    assert wrong == []
 
 
 @pytest.mark.slow

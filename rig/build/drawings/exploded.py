@@ -11,9 +11,9 @@ from scipy.spatial import ConvexHull
 from geometry.arrays import Floats
 from rig.build.drawings.frame import A3_LANDSCAPE_MM, BLOCK_MM, MARGIN_MM, Content, fitted, framed
 from rig.build.drawings.hidden import visible_lines
-from rig.build.drawings.isometric import APART_MM, BALLOON_MM, BEFORE, BEHIND, balloons
+from rig.build.drawings.isometric import APART_MM, BALLOON_MM, BEFORE, BEHIND, balloons, placed
 from rig.build.drawings.items import Item, Line, Sheet, Text
-from rig.build.drawings.layout import DENOMINATORS, PlacedView, SheetView
+from rig.build.drawings.layout import SheetView
 from rig.build.drawings.views import CAMERA_KINDS, plan_solids
 from rig.build.mounts.plan import MountPlan
 from rig.build.mounts.structure import Joint, Member, Solid, Structure
@@ -173,27 +173,18 @@ def _cell(
     ]
     if not drawn:
         return items
-    placed = _placed(drawn, view, corner, size - np.array([0.0, 7.0 + LINE_MM * len(words)]))
+    beside = np.array([APART_MM + 2.0 * BALLOON_MM, 4.0])
+    room = size - np.array([0.0, 7.0 + LINE_MM * len(words)]) - 2.0 * beside
+    joint = placed(view, [solid for solid, _, _ in drawn], corner + beside, room)
     shown = visible_lines([s.corners_mm for s, _, _ in drawn], view.axes)
     numbers = {line.part: k for k, line in reversed(list(enumerate(lines, 1)))}
     pointed: dict[int, Floats] = {}
     for (solid, came, part), found in zip(drawn, shown, strict=True):
         style = "camera" if solid.kind in CAMERA_KINDS else "visible"
-        items += [Line(segment, style) for segment in placed.flat(found)]
+        items += [Line(segment, style) for segment in joint.flat(found)]
         middle = solid.corners_mm.mean(axis=0)
         if came.any():
-            items.append(Line(placed.paper(np.stack([middle, middle - came])), "axis"))
+            items.append(Line(joint.paper(np.stack([middle, middle - came])), "axis"))
         if part in numbers:
-            pointed.setdefault(numbers[part], placed.paper(middle[None])[0])
-    return items + balloons(placed, list(pointed.items()))
-
-
-def _placed(drawn: Drawn, view: SheetView, corner: Floats, size: Floats) -> PlacedView:
-    """The joint in the middle of its cell, as large as leaves room for balloons."""
-    ends = np.concatenate([s.corners_mm for s, _, _ in drawn]) @ view.axes[:2].T
-    low, high = ends.min(axis=0), ends.max(axis=0)
-    beside = np.array([APART_MM + 2.0 * BALLOON_MM, 4.0])
-    room = size - 2.0 * beside
-    n = next((float(d) for d in DENOMINATORS if ((high - low) / d <= room).all()),
-             float(DENOMINATORS[-1]))  # fmt: skip
-    return PlacedView(view, low, high, corner + beside + (room - (high - low) / n) / 2.0, n)
+            pointed.setdefault(numbers[part], joint.paper(middle[None])[0])
+    return items + balloons(joint, list(pointed.items()))

@@ -43,7 +43,11 @@ def isometric_sheets(plan: MountPlan, lines: Sequence[BillLine]) -> tuple[Sheet,
     nuts, caps) has a line and no balloon.
     """
     solids = plan_solids(plan)
-    view = _placed(BEFORE if plan.structure.plates else BEHIND, solids)
+    around = APART_MM + 2.0 * BALLOON_MM
+    corner = np.array([MARGIN_MM, MARGIN_MM + BLOCK_MM[1] + 4.0]) + around
+    room = np.array([A3_LANDSCAPE_MM[0] - TABLE_MM, A3_LANDSCAPE_MM[1] - BLOCK_MM[1] - 12.0])
+    room -= 2.0 * (MARGIN_MM + around)
+    view = placed(BEFORE if plan.structure.plates else BEHIND, solids, corner, room)
     items: list[Item] = []
     drawn = visible_lines([s.corners_mm for s in solids], view.view.axes)
     for solid, found in zip(solids, drawn, strict=True):
@@ -81,16 +85,13 @@ def _rows(lines: Sequence[BillLine]) -> list[tuple[str, ...]]:
     ]
 
 
-def _placed(view: SheetView, solids: Sequence[Solid]) -> PlacedView:
-    """The rig beside the table, at the largest scale that leaves room for balloons."""
+def placed(view: SheetView, solids: Sequence[Solid], corner: Floats, room: Floats) -> PlacedView:
+    """Solids in the middle of a room (2,) that begins at ``corner`` (2,), as large as it allows."""
     ends = np.concatenate([s.corners_mm for s in solids]) @ view.axes[:2].T
     low, high = ends.min(axis=0), ends.max(axis=0)
-    room = np.array([A3_LANDSCAPE_MM[0] - TABLE_MM, A3_LANDSCAPE_MM[1] - BLOCK_MM[1] - 12.0])
-    room -= 2.0 * MARGIN_MM + 2.0 * (APART_MM + 2.0 * BALLOON_MM)
     n = next((float(d) for d in DENOMINATORS if ((high - low) / d <= room).all()),
              float(DENOMINATORS[-1]))  # fmt: skip
-    start = np.array([MARGIN_MM, MARGIN_MM + BLOCK_MM[1] + 4.0]) + APART_MM + 2.0 * BALLOON_MM
-    return PlacedView(view, low, high, start + (room - (high - low) / n) / 2.0, n)
+    return PlacedView(view, low, high, corner + (room - (high - low) / n) / 2.0, n)
 
 
 def _pointed(

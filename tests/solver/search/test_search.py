@@ -281,3 +281,16 @@ def test_a_cancelled_search_stops() -> None:
     cancel.set()
     with pytest.raises(CancelledError):
         placed(rigs.face(60, 120), rigs.compact_camera(), LIMITS, cancel=cancel)
+
+
+@pytest.mark.parametrize("size", [1, 2, 4])
+def test_a_network_is_judged_alike_whole_and_camera_by_camera(size: int) -> None:
+    search = Search(pool(), LIMITS)
+    rng = np.random.default_rng(size)
+    for _ in range(10):
+        network = rng.choice(len(pool()), size, replace=False)
+        broken, _ = search.scores_with_each(network[:-1])
+        assert search.broken(network) == broken[network[-1]]
+    if size == 1:
+        # Nobody is too far from a camera that is alone.
+        assert search.broken(network) == 0
