@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import escape
@@ -161,7 +162,7 @@ def _plot(acceptance: Acceptance) -> Drawing:
         drawing.add(Circle(x, y, 2.0, fillColor=HexColor(colour), strokeWidth=0))
     drawing.add(String(0, height - 9, f"error: {top:+.0f} um at the top", fontSize=7))
     drawing.add(String(0, 12, f"{-top:+.0f} um at the foot; red: the limit", fontSize=7))
-    for tick in range(0, int(longest) + 1, 50):
+    for tick in range(0, int(longest) + 1, 50 * math.ceil(longest / 500.0)):
         x, middle = place(float(tick), 0.0)
         drawing.add(Line(x, middle - 2.0, x, middle + 2.0, strokeColor=grey))
         drawing.add(String(x, 2, f"{tick} mm", fontSize=7, textAnchor="middle"))

@@ -71,10 +71,13 @@ def _dress(part: Path, place: Path, *, private: bool) -> None:
 
 
 def give_owner(path: Path, owned: os.stat_result) -> None:
-    """Give ``path`` the group and owner in ``owned``, each as far as this process may."""
-    with suppress(PermissionError):
+    """Give ``path`` the group and owner in ``owned``, each as far as this process may.
+
+    Some file systems know no owners, and some owners are not known here.
+    """
+    with suppress(OSError):
         os.chown(path, -1, owned.st_gid)
-    with suppress(PermissionError):
+    with suppress(OSError):
         os.chown(path, owned.st_uid, -1)
 
 

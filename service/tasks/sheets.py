@@ -101,9 +101,7 @@ def _placed(carrier: CarrierKind) -> list[Sheet]:
         return []
     rows = [(place.number, *(f"{v:.1f}" for v in place.position_mm)) for place in carrier.places]
     text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows(
-        [("number", "x_rig_mm", "y_rig_mm", "z_rig_mm"), *rows]
-    )
+    csv.writer(text, lineterminator="\n").writerows([PLACE_FIELDS, *rows])
     make = text.getvalue().encode
     return [Sheet(f"{_stem(carrier)}-places.csv", carrier.name, "text/csv", make)]
 

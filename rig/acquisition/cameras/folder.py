@@ -207,12 +207,16 @@ class FolderCamera:
         )
 
     def wait_frames(self, count: int, timeout_s: float) -> Sequence[Frame]:
-        """The files that came since :meth:`arm`, whole ones only."""
+        """The files that came since :meth:`arm`, whole ones only.
+
+        Those that may yet be filled are waited for; asked with no time to wait, they are given as
+        they are: a picture that is black somewhere looks the same, and nobody asks again.
+        """
         deadline = time.monotonic() + timeout_s
         while self._armed:
             began = time.monotonic()
             try:
-                self._collect()
+                self._collect(hasty=timeout_s <= 0.0)
             except OSError:  # the folder went; health and the next arm say so
                 break
             left = deadline - time.monotonic()
@@ -222,7 +226,7 @@ class FolderCamera:
             time.sleep(min(max(POLL_S, time.monotonic() - began), left))
         return tuple(self._frames)
 
-    def _collect(self) -> None:
+    def _collect(self, *, hasty: bool) -> None:
         now = time.monotonic()
         files = self._watch.files(self._below)
         for path, stamp in sorted(files.items(), key=lambda item: (item[1].modified_ns, item[0])):
@@ -232,25 +236,26 @@ class FolderCamera:
             if seen != stamp:
                 self._settling[path] = (stamp, now)
                 since = now
-            if self._is_steady(path, stamp, now - since):
+            if self._is_steady(path, stamp, now - since, hasty=hasty):
                 self._known[path] = stamp
                 if self._is_mine(path, stamp):
                     self._take(path, stamp)
 
-    def _is_steady(self, path: Path, stamp: Stamp, unchanged_s: float) -> bool:
+    def _is_steady(self, path: Path, stamp: Stamp, unchanged_s: float, *, hasty: bool) -> bool:
         """Whether a file is all there; one that may yet be filled is given longer."""
         if unchanged_s < self._options.settle_s or not self._watch.whole(path, stamp):
             return False
         if not self._watch.gaps(path, stamp):
             return True
         self._doubted.add(str(path))
-        return unchanged_s >= min(LONGEST_DOUBT_S, self._spec.deadline_s / 2.0)
+        return hasty or unchanged_s >= min(LONGEST_DOUBT_S, self._spec.deadline_s / 2.0)
 
     def _take(self, path: Path, stamp: Stamp) -> None:
         frame = self._frame(path, stamp)
         for k, former in enumerate(self._frames):
             if former.metadata["path"] == str(path) and self._written_into(former, frame):
                 self._frames[k] = replace(frame, arrived_host_ns=former.arrived_host_ns)
+                self._doubted.discard(str(path))
                 return
         self._frames.append(frame)
         self._counts["frames"] += 1
@@ -260,12 +265,12 @@ class FolderCamera:
 
         Programs add ratings, rights and rotations to files that have come.
         """
-        if former.metadata["path"] in self._doubted:
-            return True
-        times = [[f.metadata.get(t) for t in TIME_TAGS] for f in (former, now)]
-        if self._spec.shots == 1 and times[0][0] is not None:
-            return times[0] == times[1]
-        return times[0] == times[1] and same_pixels(former.encoded or b"", now.encoded or b"")
+        was, now_is = ([f.metadata.get(t) for t in TIME_TAGS] for f in (former, now))
+        known, doubted = was[0] is not None, former.metadata["path"] in self._doubted
+        if self._spec.shots == 1 and (known or doubted):
+            return was == now_is or not known
+        alike = doubted and known
+        return was == now_is and (alike or same_pixels(former.encoded or b"", now.encoded or b""))
 
     def _frame(self, path: Path, stamp: Stamp) -> Frame:
         tags = self._watch.tags(path, stamp)

@@ -34,7 +34,8 @@ _SUB_IFDS = (330, 34665)
 _MAX_IFDS = 64
 SECTOR = 512
 _PIECE = 1 << 20
-_MAX_VALUES = 1 << 20
+_MAX_PARTS = 1 << 18
+"""Of a picture, in all its directories: one strip for each row of the largest sensor is a tenth."""
 
 
 def is_whole(path: Path) -> bool:
@@ -70,10 +71,21 @@ def has_gaps(path: Path) -> bool:
     with path.open("rb") as file:
         size = path.stat().st_size
         try:
-            parts = _tiff_parts(file, size) or [(0, size)]
+            parts = _apart(_tiff_parts(file, size), size) or [(0, size)]
         except (struct.error, ValueError):
             parts = [(0, size)]
         return any(_empty_sector(file, begin, end) for begin, end in parts)
+
+
+def _apart(parts: list[tuple[int, int]], size: int) -> list[tuple[int, int]]:
+    """The same places of the file, each once: a directory may name one as often as it likes."""
+    apart: list[tuple[int, int]] = []
+    for begin, end in sorted(parts):
+        if apart and begin <= apart[-1][1]:
+            apart[-1] = apart[-1][0], min(max(end, apart[-1][1]), size)
+        elif begin < size:
+            apart.append((begin, min(end, size)))
+    return apart
 
 
 def _empty_sector(file: BinaryIO, begin: int, end: int) -> bool:
@@ -179,6 +191,8 @@ def _tiff_parts(file: BinaryIO, size: int) -> list[tuple[int, int]]:
         tags, following = _ifd(file, order, place, size)
         todo += [following, *(offset for tag in _SUB_IFDS for offset in tags.get(tag, ()))]
         parts += _extents(tags)
+        if len(parts) > _MAX_PARTS:
+            raise ValueError("there are more parts than a picture has")
     return parts
 
 
@@ -205,7 +219,7 @@ def _ifd(file: BinaryIO, order: str, place: int, size: int) -> tuple[dict[int, l
 
 def _values(file: BinaryIO, order: str, kind: int, number: int, inline: bytes) -> list[int]:
     letter = {3: "H", 4: "I", 13: "I"}.get(kind)
-    if letter is None or number > _MAX_VALUES:
+    if letter is None or number > _MAX_PARTS:
         return []
     form = f"{order}{number}{letter}"
     if struct.calcsize(form) <= 4:

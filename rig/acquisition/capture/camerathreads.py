@@ -89,9 +89,9 @@ def outcomes(
     done: dict[str, T] = {}
     problems: dict[str, str] = {}
     for name, future in futures.items():
+        while not future.done() and time.monotonic() < until and not stop():
+            wait([future], max(0.0, min(LOOK_S, until - time.monotonic())))
         try:
-            while not future.done() and time.monotonic() < until and not stop():
-                wait([future], max(0.0, min(LOOK_S, until - time.monotonic())))
             done[name] = future.result(0.0)
         except FutureTimeout:
             problems[name] = f"it did not answer within {timeout_s:.3g} s"

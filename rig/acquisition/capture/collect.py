@@ -160,8 +160,12 @@ class Collector:
         if not self._device.capabilities.fetched:
             return
         self._ask()
+        frames = tuple[Frame, ...]()
         while (left := due - FETCH_ROOM_S - time.monotonic()) > 0.0:
-            if len(self._take(count, min(SLICE_S, left))) >= count or self._want.give_up.is_set():
+            there = wanted(frames, self._want, self._start_ns)
+            frames = self._take(count + len(frames) - there, min(SLICE_S, left))
+            enough = wanted(frames, self._want, self._start_ns) >= count
+            if enough or self._want.give_up.is_set() or not self._device.health().connected:
                 return
 
     def _expected(self) -> int:
@@ -200,9 +204,9 @@ def wanted(frames: Sequence[Frame], want: Want, start_ns: int) -> int:
     """How many of the pictures can be of this capture's shots.
 
     Copies count once, and what was there or exposed before FIRE, or what the camera doubts, not at
-    all: else the wait would
-    end before the last true picture has come. Where each shot makes files of several kinds, the
-    kind counts of which there are fewest; where it is not said which, that of which there are most.
+    all: else the wait would end before the last true picture has come. Where each shot makes files
+    of several kinds, the kind counts of which there are fewest; where it is not said which, that of
+    which there are most.
     """
     seen: dict[str, set[tuple[int | None, ...]]] = {kind: set() for kind in want.kinds}
     for k, frame in enumerate(frames):

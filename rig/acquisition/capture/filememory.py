@@ -23,20 +23,35 @@ def recall(
 ) -> None:
     """Let ``evidence`` learn what the captures of a session showed of ``cameras``."""
     for record in records[-RECALLED:]:
-        shots = _shots(record)
-        past = {
-            camera.name: FileDelivery(
-                camera.name,
-                tuple(_frame(u) for u in record.unfiled if u.camera == camera.name),
-                shots,
-                0,
-                0 if camera.trigger == TriggerKind.EDGE else _wait_ns(station),
-            )
-            for camera in record.cameras
-            if camera.name in cameras
-        }
-        filed = {name: _pairs(record, name) for name in past}
-        evidence.recall([(given, filed[name]) for name, given in past.items()])
+        try:
+            past = _past(station, record, cameras)
+        except ValueError:
+            # A record that was damaged teaches nothing; `sessions verify` tells of it.
+            continue
+        evidence.recall(past)
+
+
+def _past(
+    station: Station, record: CaptureRecord, cameras: Collection[str]
+) -> list[tuple[FileDelivery, tuple[Pair, ...]]]:
+    """What came of each camera, and what of it was filed; ValueError where it cannot have been."""
+    shots = _shots(record)
+    past = []
+    for camera in record.cameras:
+        if camera.name not in cameras:
+            continue
+        given = FileDelivery(
+            camera.name,
+            tuple(_frame(u) for u in record.unfiled if u.camera == camera.name),
+            shots,
+            0,
+            0 if camera.trigger == TriggerKind.EDGE else _wait_ns(station),
+        )
+        filed = _pairs(record, camera.name)
+        if not {pair.shot for pair in filed} <= {shot.shot for shot in shots}:
+            raise ValueError("a picture of a shot that was not fired")
+        past.append((given, filed))
+    return past
 
 
 def _wait_ns(station: Station) -> int:

@@ -163,12 +163,12 @@ def _by_files(
 ) -> tuple[CameraPart, ...]:
     """The same with the files of cameras that are only seen through them given to their shots."""
     wall_ns = round(firing.fired_at.timestamp() * 1e9) - firing.fired.middle_ns
-    given = [
-        _delivery(station, firing, part, wall_ns)
+    given = {
+        part.plan.name: _delivery(station, firing, part, wall_ns)
         for part in parts
         if part.received.capabilities.by_files and part.received.trigger_times
-    ]
-    found = evidence.sort(given)
+    }
+    found = evidence.sort(list(given.values()))
     done = []
     for part in parts:
         if part.plan.name in found:
@@ -180,15 +180,17 @@ def _by_files(
                 part,
                 pairing=_explained(judged, got.problem),
                 raws=raws,
-                unfiled=_unfiled(got.frames, pairing, raws),
+                unfiled=_unfiled(given[part.plan.name], pairing, raws),
             )
         done.append(part)
     return tuple(done)
 
 
-def _unfiled(frames: Sequence[Frame], pairing: Pairing, raws: Pairing | None) -> tuple[Frame, ...]:
+def _unfiled(given: FileDelivery, pairing: Pairing, raws: Pairing | None) -> tuple[Frame, ...]:
+    """What came after the first shot and has no place."""
     pairs = (*pairing.pairs, *(() if raws is None else raws.pairs))
-    return tuple(f for f in frames if all(f is not one.frame for one in pairs))
+    after = (f for f in given.frames if f.arrived_host_ns >= given.first_host_ns)
+    return tuple(f for f in after if all(f is not one.frame for one in pairs))
 
 
 def _delivery(station: Station, firing: Firing, part: CameraPart, wall_ns: int) -> FileDelivery:

@@ -108,7 +108,7 @@ def _moments(group: Sequence[Frame]) -> list[list[Frame]]:
         for moment in moments:
             then = file_time(moment[0].metadata)
             other = _body(moment[0])
-            if then is not None and at.common(then) and not (body and other and body != other):
+            if then is not None and _at_once(at, then) and not (body and other and body != other):
                 moment.append(frame)
                 break
         else:
@@ -119,6 +119,12 @@ def _moments(group: Sequence[Frame]) -> list[list[Frame]]:
     elif silent:
         moments.append(silent)
     return moments
+
+
+def _at_once(one: Span, other: Span) -> bool:
+    """Whether two told times can be one: one second ends where the next begins."""
+    common = one.common(other)
+    return common is not None and common.low_ns < common.high_ns
 
 
 def _body(frame: Frame) -> str:

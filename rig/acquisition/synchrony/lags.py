@@ -111,17 +111,31 @@ def new_timings(station: Station, estimates: Mapping[str, LagEstimate]) -> dict[
     # Middles can be brought together only where every exposure's length is known.
     middles = all(math.isfinite(estimates[camera.name].exposure_us) for camera in wired)
     late = {camera.name: _late_us(estimates[camera.name], middles) for camera in wired}
-    of_output = {
-        output: _middle([late[camera.name] for camera in wired if camera.output == output])
-        for output in {camera.output for camera in wired}
+    together = {
+        camera.name: _middle([late[other.name] for other in group])
+        for group in _on_common_outputs(wired)
+        for camera in group
     }
-    latest = max(of_output.values())
+    latest = max(together.values())
     return {
-        camera.name: Timing(
-            latest - of_output[camera.output], max(0.0, estimates[camera.name].lag_us)
-        )
+        camera.name: Timing(latest - together[camera.name], max(0.0, estimates[camera.name].lag_us))
         for camera in wired
     }
+
+
+def _on_common_outputs(wired: Sequence[CameraPlan]) -> list[list[CameraPlan]]:
+    """Cameras that share an output, for their shutters or their focus, directly or by others.
+
+    They have one delay.
+    """
+    groups: list[tuple[set[int | None], list[CameraPlan]]] = []
+    for camera in wired:
+        outputs = {camera.output, camera.focus_output} - {None}
+        mine = [group for group in groups if group[0] & outputs]
+        groups = [group for group in groups if group not in mine]
+        joined = [other for _, cameras in mine for other in cameras]
+        groups.append((outputs.union(*(taken for taken, _ in mine)), [*joined, camera]))
+    return [cameras for _, cameras in groups]
 
 
 def _middle(values: Sequence[float]) -> float:

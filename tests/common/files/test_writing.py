@@ -175,3 +175,16 @@ def test_an_administrator_leaves_files_to_their_owner(
     given.clear()
     write_whole(tmp_path / "new", b"new", private=private)
     assert [user for _, user, _ in given] == ([-1, place.st_uid] if private else [])
+
+
+def test_a_file_system_without_owners_is_written_to(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def chown(*_: object) -> None:
+        raise OSError(errno.ENOSYS, "Function not implemented")
+
+    path = tmp_path / "a.txt"
+    path.write_text("old")
+    monkeypatch.setattr(os, "chown", chown)
+    write_whole(path, b"new", overwrite=True)
+    assert path.read_bytes() == b"new"

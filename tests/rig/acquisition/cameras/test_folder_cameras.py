@@ -227,3 +227,31 @@ def test_wrong_options_are_named(tmp_path: Path) -> None:
         assert caught.value.code == "input/camera-option"
     with pytest.raises(NotFoundError, match=r"known: none"):
         folder(tmp_path).open("left")
+
+
+def black_below(colour: int) -> bytes:
+    """A TIFF of one colour whose lower half is black, as room that is not yet filled."""
+    half = np.zeros((90, 120, 3), np.uint8)
+    half[:45] = colour
+    made = BytesIO()
+    Image.fromarray(half).save(made, "TIFF")
+    return made.getvalue()
+
+
+def test_a_picture_that_may_yet_be_filled_is_there_when_nobody_waits_longer(tmp_path: Path) -> None:
+    (tmp_path / "left").mkdir()
+    camera = folder(tmp_path).open("left")
+    camera.arm(SHOT)
+    (tmp_path / "left" / "a.tif").write_bytes(black_below(80))
+    assert camera.wait_frames(1, 3 * SETTLE_S) == ()
+    assert len(camera.wait_frames(1, 0.0)) == 1
+
+
+def test_shots_of_one_name_that_are_black_somewhere_are_two(tmp_path: Path) -> None:
+    (tmp_path / "left").mkdir()
+    camera, path = folder(tmp_path).open("left"), tmp_path / "left" / "latest.tif"
+    camera.arm(ArmSpec("a", 2, 0.4))
+    for colour in (80, 160):
+        path.write_bytes(black_below(colour))
+        camera.wait_frames(2, 5 * SETTLE_S)
+    assert len(camera.wait_frames(2, 0.0)) == 2

@@ -13,7 +13,13 @@ from camera_rigs import jpeg
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from rig.acquisition.cameras.wholeness import MEDIA_TYPES, is_whole
+from rig.acquisition.cameras.wholeness import (
+    MEDIA_TYPES,
+    _apart,
+    _tiff_parts,
+    has_gaps,
+    is_whole,
+)
 
 
 def picture() -> np.ndarray:
@@ -99,3 +105,32 @@ def test_a_tiff_that_leads_in_circles_ends(tmp_path: Path) -> None:
 
 def test_a_file_that_is_not_there_is_not_whole(tmp_path: Path) -> None:
     assert not is_whole(tmp_path / "gone.jpg")
+
+
+def greedy(directories: int, strips: int, length: int) -> bytes:
+    """A TIFF whose directories all name the same strips, each as long as the file."""
+    ifd = 2 + 2 * 12 + 4
+    arrays = 8 + directories * ifd
+    out = b"II*\0" + struct.pack("<I", 8)
+    for k in range(directories):
+        out += struct.pack("<H", 2) + struct.pack("<HHII", 273, 4, strips, arrays)
+        out += struct.pack("<HHII", 279, 4, strips, arrays + 4 * strips)
+        out += struct.pack("<I", 0 if k == directories - 1 else 8 + (k + 1) * ifd)
+    out += struct.pack("<I", 8) * strips + struct.pack("<I", length - 8) * strips
+    return out.ljust(length, b"x")
+
+
+def test_a_file_that_names_more_parts_than_a_picture_has_is_none(tmp_path: Path) -> None:
+    path = tmp_path / "greedy.tif"
+    path.write_bytes(greedy(60, 1 << 16, 1 << 20))
+    assert not is_whole(path)
+
+
+def test_parts_that_lie_on_one_another_are_looked_at_once(tmp_path: Path) -> None:
+    """Else a megabyte would be read a thousand times, while all cameras of the folder wait."""
+    path = tmp_path / "greedy.tif"
+    path.write_bytes(greedy(1, 1000, 1 << 20))
+    assert is_whole(path)
+    with path.open("rb") as file:
+        assert _apart(_tiff_parts(file, 1 << 20), 1 << 20) == [(8, 1 << 20)]
+    assert not has_gaps(path)

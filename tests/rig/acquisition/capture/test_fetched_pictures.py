@@ -109,3 +109,21 @@ def test_a_download_that_holds_up_a_shot_is_not_repeated() -> None:
     got = burst(Body(download_s=1.7 * INTERVAL_S))
     assert len(got.frames) == 3
     assert len(got.asked_ns) == 2, "after the first shot and after the last"
+
+
+def test_a_body_that_is_gone_is_not_asked_again_and_again() -> None:
+    class Gone(Body):
+        """Its process ended after the first shot; whoever asks it is answered at once."""
+
+        asked = 0
+
+        def wait_frames(self, count: int, timeout_s: float) -> Sequence[Frame]:  # noqa: ARG002
+            self.asked += 1
+            return ()
+
+        def health(self) -> CameraHealth:
+            return CameraHealth(connected=False)
+
+    body = Gone()
+    burst(body, deadline_s=0.1)
+    assert body.asked < 10

@@ -20,11 +20,13 @@ from PIL import Image
 from PIL.ExifTags import IFD, Base
 
 from common.errors import ConflictError, InputError
+from rig.acquisition.capture.filememory import recall
 from rig.acquisition.capture.rig import Rig
 from rig.acquisition.session.folder import Session
 from rig.acquisition.session.records import CaptureRecord
 from rig.acquisition.session.verify import verify_session
 from rig.acquisition.station.spec import CameraPlan, Station
+from rig.acquisition.synchrony.fileevidence import FileEvidence
 from rig.devices.station import open_station
 
 CAMERAS = ("cam01", "cam02", "cam03")
@@ -348,3 +350,14 @@ def test_locks_go_by_folder_and_not_by_name(tmp_path: Path) -> None:
     plans = (CameraPlan("left", "folder", "left"), CameraPlan("right", "folder", "right"))
     with pytest.raises(InputError, match=r"'left' and 'right' have the same folder"):
         open_station(replace(one, cameras=plans, backend_options={"folder": twice}), locks=locks)
+
+
+def test_records_that_cannot_be_teach_nothing(tethered: Tethered) -> None:
+    record = tethered.capture("one", tethered.sound(1))
+    (frame, *others) = record.frames
+    damaged = (
+        record.model_copy(update={"fired_at": "yesterday"}),
+        record.model_copy(update={"frames": [frame.model_copy(update={"shot": 99}), *others]}),
+        record.model_copy(update={"frames": [frame.model_copy(update={"method": "luck"})]}),
+    )
+    recall(FileEvidence(), tethered.rig.station, damaged, CAMERAS)

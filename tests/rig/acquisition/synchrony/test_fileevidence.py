@@ -17,7 +17,7 @@ from rig.acquisition.synchrony.fileevidence import (
     FileEvidence,
     FiredShot,
 )
-from rig.acquisition.synchrony.fileexposures import Span, file_time
+from rig.acquisition.synchrony.fileexposures import Span, file_exposures, file_time
 
 SECOND = 1_000_000_000
 NOON = datetime(2026, 11, 29, 12, tzinfo=UTC)
@@ -403,3 +403,10 @@ def test_no_file_is_given_to_a_wrong_shot(seed: int) -> None:
     assert counts["wrong"] == 0, counts
     # Even where clocks are off and shots follow at a steady pace, others go on.
     assert counts["right"] > 300, counts
+
+
+def test_files_of_neighbouring_seconds_are_of_two_exposures() -> None:
+    at = [NOON + timedelta(seconds=k) for k in range(2)]
+    exposures, spare = file_exposures([picture("a.jpg", t, str(k)) for k, t in enumerate(at)], 1)
+    assert [e.time for e in exposures] == [file_time(tags(t)) for t in at]
+    assert not spare

@@ -70,3 +70,17 @@ def test_a_lag_that_drifts_is_told_and_not_written() -> None:
 def test_a_trend_beyond_chance_is_a_drift(lags_us: tuple[float, ...], drifts: bool) -> None:
     figures = [(lag, 50.0, 4000.0) for lag in lags_us]
     assert (_estimate("cam01", figures, "optical").drift_us != 0.0) == drifts
+
+
+def test_cameras_on_one_focus_line_get_one_delay() -> None:
+    """Each has its own output for the shutter, and none for the focus."""
+    lags_us = {"cam01": 50_000.0, "cam02": 54_000.0, "cam03": 60_000.0}
+    cameras = tuple(
+        replace(CAMERA, name=name, id=name, output=k, focus_output=None if k == 3 else 9)
+        for k, name in enumerate(lags_us, 1)
+    )
+    station = Station("s", cameras, TriggerPlan("rigwright", "fake:"))
+    estimates = {name: replace(estimate(lag), camera=name) for name, lag in lags_us.items()}
+    timings = new_timings(station, estimates)
+    assert [found.delay_us for found in timings.values()] == [8000.0, 8000.0, 0.0]
+    with_new_timings(station, timings)
