@@ -1,6 +1,7 @@
 """The command ``rigwright``.
 
-Only what the help needs is imported here; a command imports its own tools when it runs.
+Only what the help needs is imported here; a command imports its own tools when it runs, and its
+options are read when it is asked for (``service.cli.lazy``).
 """
 
 from __future__ import annotations
@@ -37,9 +38,19 @@ from service.cli.commands.study import study
 from service.cli.commands.targets import targets
 from service.cli.commands.trial import trial
 from service.cli.commands.trigger import trigger
+from service.cli.lazy import LazyCommands, group_of
+
+COMMANDS = LazyCommands(
+    *(demo, scan, design, evaluate, study, plan, catalogue, export),
+    *(targets, calibrate, check, accept),
+    *(reconstruct, compare, trial),
+    *(practice, capture, cameras, fake_trigger, serve, backup, restore),
+    *(rig, trigger, sessions, keys, recognise),
+)
 
 app = typer.Typer(
     name="rigwright",
+    cls=group_of(COMMANDS),
     help="Designs and runs multi-camera rigs that photograph a face from all sides at one instant.",
     no_args_is_help=True,
     add_completion=False,
@@ -67,17 +78,6 @@ def _options(
     ] = False,
 ) -> None:
     """Designs multi-camera rigs that photograph a face from all sides at one instant."""
-
-
-for command in (
-    *(demo, scan, design, evaluate, study, plan, catalogue, export),
-    *(targets, calibrate, check, accept),
-    *(reconstruct, compare, trial),
-    *(practice, capture, cameras, fake_trigger, serve, backup, restore),
-):
-    app.command(command.__name__.replace("_", "-"))(command)
-for group in (rig, trigger, sessions, keys, recognise):
-    app.add_typer(group)
 
 
 def main() -> None:

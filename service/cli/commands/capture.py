@@ -5,7 +5,6 @@ from __future__ import annotations
 import sys
 from datetime import datetime, timedelta
 from pathlib import Path
-from secrets import token_hex
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -145,6 +144,8 @@ class CaptureIds:
 
     def next(self) -> str:
         """The time to the millisecond, and letters that no other computer makes up."""
+        from secrets import token_hex
+
         now = datetime.now()
         now = now.replace(microsecond=now.microsecond // 1000 * 1000)
         self._last = max(now, self._last + timedelta(milliseconds=1))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import sys
-import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -67,6 +66,8 @@ def plan(
 
     Example:  rigwright plan --rig rig.toml --scan head.ply --mount tripods.toml --out plan
     """
+    import tempfile
+
     from common.errors import InputError
     from common.files.folders import new_folder
     from rig.build.mounts.systemfile import read_system_file

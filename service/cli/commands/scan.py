@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -48,6 +47,8 @@ def run_scan_command(
     scan_file: Path, rig: Path | None, picture: Path | None, *, as_json: bool
 ) -> None:
     """Read ``scan_file`` as ``rig`` says and show what was understood."""
+    import tempfile
+
     from common.files.writing import write_whole
     from service.cli.output import print_json
     from service.cli.running import one_line_errors, require_files, run_task
