@@ -1,6 +1,6 @@
 """Whether the check tells what happened first and alone: many causes at random sizes, simulated.
 
-    python -m benchmarks.causes [--trials 100] [--verbose]
+    python -m benchmarks.causes [--trials 100] [--causes late dirty] [--groups 100] [--verbose]
 
 Fixed seeds. Groups of two to four cameras that moved together are judged against the error that
 they truly make: points of a face, each seen by the cameras that look at it, intersected with the
@@ -14,16 +14,18 @@ import logging
 import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cache
 
 os.environ.update(
     dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 )
 
 import numpy as np
-from calibrations import check_scene, small_reference
+from calibrations import check_scene, small_scene
 from synthetic_scenes import Scene
 
 from benchmarks.pages import table
+from calibration.adjustment import Calibration, CalibrationOptions, calibrate
 from calibration.adjustment.initialisation.rays import nearest_points
 from calibration.adjustment.rotations import rotation_of, similarity
 from calibration.check import CheckOptions, CheckResult, Kind, Light, check
@@ -32,7 +34,7 @@ from common.errors import InputError
 from geometry.arrays import Floats, Ints
 from geometry.frames import Pose
 
-SIGMA_PX, BLUR_PX = 0.1, 0.8
+SIGMA_PX, BLUR_PX, REFERENCES = 0.1, 0.8, 40
 FACE_MM, FACE_POINTS, WIDEST_DEG = 90.0, 200, 65.0
 
 Random = np.random.Generator
@@ -137,7 +139,11 @@ def folders(random: Random) -> Case:
 
 def all_scales(random: Random) -> Case:
     """All focal lengths changed by one factor, 300 to 2000 ppm."""
-    factor = 1.0 + random.uniform(3e-4, 2e-3) * random.choice([-1.0, 1.0])
+    return _scaled(random, 3e-4, 2e-3)
+
+
+def _scaled(random: Random, least: float, most: float) -> Case:
+    factor = 1.0 + random.uniform(least, most) * random.choice([-1.0, 1.0])
     cameras = tuple(
         replace(
             c, interior=replace(c.interior, focal_length_px=c.interior.focal_length_px * factor)
@@ -146,6 +152,54 @@ def all_scales(random: Random) -> Case:
     )
     seen = observed(check_scene().with_cameras(cameras), random)
     return Case(seen, Kind.LENS_CHANGED, "focal lengths of all cameras")
+
+
+def binned(random: Random) -> Case:
+    """Pictures of a camera binned by 2, 3 or 4."""
+    seen, camera, factor = observed(check_scene(), random), _one(random), int(random.integers(2, 5))
+    pixel, own, sizes = seen.pixel.copy(), seen.camera == camera, seen.image_size_px.copy()
+    pixel[own] = (pixel[own] + 0.5) / factor - 0.5
+    sizes[camera] //= factor
+    seen = replace(seen, pixel=np.clip(pixel, 0.0, None), image_size_px=sizes)
+    return Case(seen, Kind.LENS_CHANGED, "binning")
+
+
+def _of_all(random: Random, change: Callable[[Floats, Ints], Floats]) -> Observations:
+    seen = observed(check_scene(), random)
+    sizes = seen.image_size_px[seen.camera]
+    pixel = change(seen.pixel, sizes)
+    inside = ((pixel >= 0.0) & (pixel <= sizes - 1.0)).all(axis=1)
+    return replace(seen, pixel=np.clip(pixel, 0.0, None)).subset(np.flatnonzero(inside))
+
+
+def all_cropped(random: Random) -> Case:
+    """Pictures of all cameras cut out 4 to 40 px farther to one side."""
+    shift = random.uniform(4.0, 40.0, 2) * random.choice([-1.0, 1.0], 2)
+    seen = _of_all(random, lambda p, _: p - np.rint(shift))
+    return Case(seen, Kind.LENS_CHANGED, "all cameras are shifted")
+
+
+def all_turned(random: Random) -> Case:
+    """Pictures of all cameras turned by 180 degrees."""
+    seen = _of_all(random, lambda p, s: s - 1.0 - p)
+    return Case(seen, Kind.LENS_CHANGED, "all cameras are turned by 180")
+
+
+def all_resized(random: Random) -> Case:
+    """All focal lengths changed by one factor, 0.3 to 30 %."""
+    return _scaled(random, 3e-3, 0.3)
+
+
+def late_pair(random: Random) -> Case:
+    """Two cameras one frame late or early."""
+    places, cameras = check_scene().places[1], random.choice(5, 2, replace=False)
+    last = len(places) - 1
+    other = {}
+    for camera in cameras.tolist():
+        step = int(random.choice([-1, 1]))
+        other |= {(camera, f): places[min(max(f - step, 0), last)] for f in range(last + 1)}
+    scene = replace(check_scene(), seen_otherwise=other)
+    return Case(observed(scene, random), Kind.UNSYNCHRONISED, "one frame")
 
 
 def missing(random: Random) -> Case:
@@ -165,13 +219,26 @@ CAUSES: tuple[Disturb, ...] = (
     folders,
     all_scales,
     missing,
+    binned,
+    all_cropped,
+    all_turned,
+    all_resized,
+    late_pair,
 )
 
 
-def checked(observations: Observations) -> CheckResult:
-    """The verdict against the reference, whose edges were sharp."""
-    count = len(check_scene().cameras)
-    return check(replace(small_reference(), blur_px=np.full(count, BLUR_PX)), observations)
+@cache
+def reference(number: int) -> Calibration:
+    """A calibration of the scene by its number: each has errors of its own; its edges are sharp."""
+    scene = small_scene()
+    options = CalibrationOptions(start=scene.cameras, cross_validate=False)
+    done = calibrate(scene.observe(SIGMA_PX, 2000 + number), options)
+    return replace(done, blur_px=np.full(len(scene.cameras), BLUR_PX))
+
+
+def checked(observations: Observations, number: int) -> CheckResult:
+    """The verdict of a trial. One reference for all would share its errors among them."""
+    return check(reference(number % REFERENCES), observations)
 
 
 def cause_row(disturb: Disturb, count: int) -> tuple[str, ...]:
@@ -180,7 +247,7 @@ def cause_row(disturb: Disturb, count: int) -> tuple[str, ...]:
     for number in range(count):
         case = disturb(np.random.default_rng([CAUSES.index(disturb), number]))
         try:
-            result = checked(case.observations)
+            result = checked(case.observations, number)
         except InputError as error:
             LOG.info("%s, trial %d: %s", disturb.__name__, number, error)
             continue
@@ -243,11 +310,11 @@ def group_rows(count: int) -> list[tuple[str, ...]]:
         error_mm = true_error_mm(scene)
         if error_mm > tolerance:
             matter += 1
-            result = checked(observed(scene, random))
+            result = checked(observed(scene, random), number)
             red += result.light is Light.RED
             if result.light is not Light.RED:
                 LOG.info("group, trial %d, %.3f mm: %s", number, error_mm, result.sentence)
-        false += checked(observed(check_scene(), random)).light is not Light.GREEN
+        false += checked(observed(check_scene(), random), number).light is not Light.GREEN
     return [
         (
             f"Groups whose true error is above {1e3 * tolerance:.0f} um: red",
@@ -265,9 +332,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--trials", type=int, default=100)
     parser.add_argument("--verbose", action="store_true", help="each trial that was not told")
+    names = [disturb.__name__ for disturb in CAUSES]
+    parser.add_argument("--causes", nargs="*", choices=names, default=names)
+    parser.add_argument("--groups", type=int, help="trials of groups; as many as of causes")
     asked = parser.parse_args()
     logging.basicConfig(level=logging.INFO if asked.verbose else logging.WARNING)
-    rows = [cause_row(disturb, asked.trials) for disturb in CAUSES] + group_rows(asked.trials)
+    rows = [cause_row(d, asked.trials) for d in CAUSES if d.__name__ in asked.causes]
+    groups = asked.trials if asked.groups is None else asked.groups
+    rows += group_rows(groups) if groups else []
     print(table(("what happened", "trials", "told first", "told alone", "asked"), rows))
 
 

@@ -8,11 +8,12 @@ import numpy as np
 
 from calibration.adjustment.result import Calibration
 from calibration.check import messages as words
+from calibration.check.changes import changes, effect_of_mm
 from calibration.check.condition import LEAST_POINTS, condition_of
 from calibration.check.diagnosis import Diagnosis, diagnose
 from calibration.check.effects import effects
 from calibration.check.epoch import Epoch, epoch_of
-from calibration.check.findings import findings, joint_effect_mm, scale_estimate
+from calibration.check.findings import findings, scale_estimate
 from calibration.check.gross import Corrected, corrected_epoch
 from calibration.check.hypotheses import ALPHA, Cause
 from calibration.check.subject import subject_of
@@ -97,6 +98,7 @@ def check(
         diagnosis,
         options or CheckOptions(),
         (*condition.findings, *corrected.pictures),
+        condition.checkable,
     )
 
 
@@ -108,21 +110,25 @@ def judge(
     diagnosis: Diagnosis,
     options: CheckOptions,
     before: tuple[Finding, ...] = (),
+    checkable: bool = True,
 ) -> CheckResult:
     """All tables and findings of a finished diagnosis.
 
-    ``before``: what the state of the pictures told already; of these cameras nothing else is told.
+    ``before``: what the state of the pictures told already; of these cameras nothing else is told,
+    and nothing at all where too little is left to be ``checkable``.
     """
     found = effects(diagnosis.epoch, diagnosis.first.state)
     noise = noise_of(diagnosis)
     subject = subject_of(diagnosis.epoch, diagnosis.first.state)
     alarms = _weighed(
         findings(corrected, diagnosis, found, subject),
-        joint_effect_mm(diagnosis, subject),
+        effect_of_mm(changes(diagnosis), subject),
         options,
     )
     cameras = camera_checks(diagnosis, found, noise, options.hidden_limit_mm)
-    reported = _after(before, verdicts(alarms, cameras, noise, diagnosis))
+    reported = before
+    if checkable or not before:
+        reported = _after(before, verdicts(alarms, cameras, noise, diagnosis))
     scale, scale_sigma = _scale(diagnosis)
     distances = reference.targets.distances or observations.targets.distances
     residual = diagnosis.first.v * _sigmas(diagnosis)

@@ -1,4 +1,4 @@
-"""Whether pictures are fit to be checked at all: cameras that are missing, soft, or half blind.
+"""Whether pictures are fit to be checked: missing, of another size, soft, or half blind.
 
 These come before any movement: of a camera that is out of focus nobody can say that it moved, and
 dirt on a lens shifts image points as no movement does.
@@ -6,10 +6,12 @@ dirt on a lens shifts image points as no movement does.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
+from calibration.adjustment.camera import CalibratedCamera
 from calibration.adjustment.result import Calibration
 from calibration.check import messages
 from calibration.check.verdicts import Finding, Kind
@@ -32,10 +34,15 @@ a smaller share is told."""
 
 @dataclass(frozen=True, eq=False)
 class Condition:
-    """What is wrong with pictures, and which observations (n,) may take part in a check."""
+    """What is wrong with pictures, and which observations (n,) may take part in a check.
+
+    ``checkable``: whether what may take part is a check at all. Otherwise all are kept, for their
+    figures, and nothing else is to be said.
+    """
 
     findings: tuple[Finding, ...]
     keep: Bools
+    checkable: bool
 
     @property
     def cameras(self) -> frozenset[str]:
@@ -59,8 +66,12 @@ def condition_of(reference: Calibration, observations: Observations) -> Conditio
     if few:
         found.append(Finding(Kind.CANNOT_TELL, few, messages.few(few, LEAST_POINTS)))
         keep &= ~np.isin(observations.camera, [index[name] for name in few])
+    resized = [f for c in reference.cameras if (f := _other_size(c, observations, index))]
+    found += resized
+    others = {name for f in resized for name in f.subjects}
+    keep &= ~np.isin(observations.camera, [index[name] for name in others])
     for k, camera in enumerate(reference.cameras):
-        if points[k] < LEAST_POINTS:
+        if points[k] < LEAST_POINTS or camera.name in others:
             continue
         own = observations.camera == index[camera.name]
         soft, more = _softness(camera.name, float(reference.blur_px[k]), observations, own)
@@ -70,9 +81,27 @@ def condition_of(reference: Calibration, observations: Observations) -> Conditio
     blamed = {name for f in found for name in f.subjects}
     found += [f for f in _half_blind(reference, points) if not blamed & set(f.subjects)]
     # What is left must still be a check: two cameras at the least.
-    if len(np.unique(observations.camera[keep])) < LEAST_CAMERAS:
+    checkable = len(np.unique(observations.camera[keep])) >= LEAST_CAMERAS
+    if not checkable:
         keep[:] = True
-    return Condition(tuple(found), keep)
+    return Condition(tuple(found), keep, checkable)
+
+
+def _other_size(
+    camera: CalibratedCamera, observations: Observations, index: Mapping[str, int]
+) -> Finding | None:
+    """What there is to say of a camera whose pictures have another size than in the reference."""
+    if camera.name not in index:
+        return None
+    width, height = (int(v) for v in observations.image_size_px[index[camera.name]])
+    if (width, height) == camera.image_size_px:
+        return None
+    if (height, width) == camera.image_size_px:
+        sentence = messages.on_its_side(camera.name, (width, height), camera.image_size_px)
+    else:
+        sentence = messages.other_size(camera.name, (width, height), camera.image_size_px)
+    ratio = width / camera.image_size_px[0]
+    return Finding(Kind.LENS_CHANGED, (camera.name,), sentence, value=ratio)
 
 
 def _softness(

@@ -14,6 +14,7 @@ import numpy as np
 from scipy.special import chdtri
 
 from calibration.adjustment.state import State
+from calibration.check.alike import alike
 from calibration.check.epoch import Epoch
 from calibration.check.fit import Fit, again, fit, refit
 from calibration.check.hypotheses import Cause, Hypothesis, hypotheses, log_tail
@@ -31,9 +32,6 @@ LARGE_PX = 3.0
 """Changes beyond this are compared by full fits: the linear statistics mislead there."""
 
 SHORTLIST = 6
-ALIKE = 1.5
-"""Chi-square per image point that one cause for all cameras may leave."""
-
 MOST_SETS = 2000
 
 
@@ -96,7 +94,7 @@ def diagnose(
     outcomes = tests.run(first.score)
     last, accepted, present, current = first, [], outcomes, tests
     if suspects:
-        accepted = _all_alike(epoch, state, tests)
+        accepted = list(alike(epoch, state, tests.hypotheses))
         accepted = accepted or convicted(epoch, state, tests.hypotheses, suspects, first)
         last = fit_with(epoch, state, accepted)
         epoch, last, lost = _cleaned(epoch, last)
@@ -139,12 +137,6 @@ def _pruned(
         if without.chi2 - whole.chi2 < chdtri(one.ways.shape[1], one.alpha):
             kept, last = fewer, without
     return kept, last
-
-
-def _all_alike(epoch: Epoch, state: State, tests: ScoreTests) -> list[Hypothesis]:
-    """The cause that changes all cameras alike, where it alone explains what several show."""
-    every = [h for h in tests.hypotheses if h.cause is Cause.ALL_FOCAL]
-    return every if fit_with(epoch, state, every).chi2 < ALIKE * 2 * len(epoch.pixel) else []
 
 
 def _together(causes: list[Hypothesis], last: Fit) -> Floats:

@@ -19,6 +19,10 @@ URAD = 1e6
 MICROMETRE = 1e3
 
 
+PARALLEL = 1e-6
+"""Least over largest weight of a point; rays a milliradian apart meet in a point of that."""
+
+
 @dataclass(frozen=True, eq=False)
 class Effects:
     """Mean squares at what each camera sees: ``change^T form change`` of its 19 parameters.
@@ -64,8 +68,9 @@ def _point_shifts(epoch: Epoch, by_point: Floats, by_camera: Floats) -> Floats:
     blocks = np.swapaxes(by_point, 1, 2) @ by_point
     normal = np.zeros((int(point.max(initial=-1)) + 1, 3, 3))
     np.add.at(normal, point, blocks)
-    rays = np.bincount(point)
-    good = rays >= 2
+    # Rays of one camera to a target that stands meet nowhere, however many frames show it.
+    sizes = np.linalg.eigvalsh(normal)
+    good = sizes[:, 0] > PARALLEL * sizes[:, 2]
     inverse = np.zeros_like(normal)
     inverse[good] = np.linalg.inv(normal[good])
     return np.asarray(inverse[point] @ np.swapaxes(by_point, 1, 2) @ by_camera)

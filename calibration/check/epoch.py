@@ -9,6 +9,7 @@ import numpy as np
 from calibration.adjustment.finite import finite_rows
 from calibration.adjustment.initialisation.views import Placements
 from calibration.adjustment.result import Calibration
+from calibration.check.messages import why_of_size
 from calibration.check.reference import Reference
 from calibration.observations import Observations
 from common.errors import InputError
@@ -151,7 +152,8 @@ def _cameras(calibration: Calibration, observations: Observations) -> Ints:
             raise InputError(
                 "check-image-size",
                 f"camera {camera.name!r} has images of {size[0]} x {size[1]} px, in the reference "
-                f"{camera.image_size_px[0]} x {camera.image_size_px[1]}",
+                f"{camera.image_size_px[0]} x {camera.image_size_px[1]}, "
+                f"{why_of_size((size[0], size[1]), camera.image_size_px)}",
                 "use the same image size and crop as for the reference",
             )
     return np.array([known[name] for name in observations.cameras])

@@ -3,23 +3,28 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from dataclasses import dataclass
 
 import numpy as np
 
-from calibration.adjustment.camera import INTERIOR, PER_CAMERA
+from calibration.adjustment.camera import INTERIOR
 from calibration.check import messages as words
+from calibration.check.changes import (
+    LOG10,
+    Change,
+    by_camera,
+    camera_change,
+    changes,
+    effect_of_mm,
+)
 from calibration.check.diagnosis import Diagnosis
 from calibration.check.effects import Effects
 from calibration.check.gross import Corrected
 from calibration.check.groups import rigid_group
-from calibration.check.hypotheses import Cause, Hypothesis, log_tail
+from calibration.check.hypotheses import ALL_LENSES, Cause, Hypothesis, log_tail
 from calibration.check.scores import estimate
 from calibration.check.subject import Subject
 from calibration.check.verdicts import Finding, Kind
-from geometry.arrays import Floats
 
-LOG10 = float(np.log(10.0))
 RIVAL = 10.0
 """Another camera whose statistic comes this near would explain the images almost as well."""
 
@@ -32,70 +37,6 @@ CROP_SHARE = 0.1
 out elsewhere: no lens does that."""
 
 SYNC = (Cause.VIEW, Cause.CAMERA_SYNC, Cause.PLACE_SYNC)
-
-
-@dataclass(frozen=True, eq=False)
-class Change:
-    """An accepted cause, the change (d,) along its directions, and its test."""
-
-    cause: Hypothesis
-    change: Floats
-    statistic: float
-    dof: int
-
-    @property
-    def log10_p(self) -> float:
-        """Decimal logarithm of the chance of such a statistic when nothing happened."""
-        return log_tail(self.statistic, self.dof) / LOG10
-
-
-def changes(diagnosis: Diagnosis) -> tuple[Change, ...]:
-    """The accepted causes with their sizes, from the fit in which all are free."""
-    out = []
-    index = {id(h): k for k, h in enumerate(diagnosis.tests.hypotheses)}
-    first = len(diagnosis.last.unknowns) - diagnosis.last.linear.freed.shape[1]
-    for cause in diagnosis.accepted:
-        size = cause.ways.shape[1]
-        k = index[id(cause)]
-        out.append(
-            Change(
-                cause,
-                diagnosis.last.unknowns[first : first + size],
-                float(diagnosis.outcomes.statistic[k]),
-                int(diagnosis.tests.dof[k]),
-            )
-        )
-        first += size
-    return tuple(out)
-
-
-def camera_change(one: Change) -> Floats:
-    """A change of a camera or its lens as one of all its parameters (19,)."""
-    out = np.zeros(PER_CAMERA)
-    first = INTERIOR if one.cause.cause is Cause.POSE else 0
-    out[first : first + len(one.change)] = one.change
-    return out
-
-
-def joint_effect_mm(diagnosis: Diagnosis, subject: Subject) -> float:
-    """What all changes of cameras do together at the subject; NaN when none changed."""
-    done: dict[int, Floats] = {}
-    for one in changes(diagnosis):
-        for camera, change in _by_camera(one).items():
-            done[camera] = done.get(camera, np.zeros(PER_CAMERA)) + change
-    return subject.effect_mm(done) if done else float("nan")
-
-
-def _by_camera(one: Change) -> dict[int, Floats]:
-    """A change's share in each camera's parameters (19,); empty for those of targets."""
-    if one.cause.cause in (Cause.POSE, Cause.LENS):
-        return {one.cause.subject: camera_change(one)}
-    if one.cause.cause is not Cause.ALL_FOCAL:
-        return {}
-    pixels = one.cause.ways[:, 0] * one.change[0]
-    first = np.eye(PER_CAMERA)[0]
-    cameras = one.cause.columns // PER_CAMERA
-    return {int(k): px * first for k, px in zip(cameras, pixels, strict=True)}
 
 
 def findings(
@@ -112,15 +53,16 @@ def findings(
         out.append(_most_cameras(done, diagnosis))
         done = tuple(c for c in done if c.cause.cause not in (Cause.POSE, Cause.LENS))
     by_carrier: dict[int, list[Change]] = defaultdict(list)
-    sync = []
+    sync: list[Change] = []
+    lenses: list[Change] = []
     for one in done:
         cause = one.cause.cause
         if cause is Cause.POSE:
             out.append(_camera(one, diagnosis, found, subject))
         elif cause is Cause.LENS:
             out.append(_lens(one, diagnosis, found, subject))
-        elif cause is Cause.ALL_FOCAL:
-            out.append(_all_lenses(one, diagnosis, subject))
+        elif cause in ALL_LENSES:
+            lenses.append(one)
         elif cause is Cause.TARGET:
             by_carrier[int(diagnosis.epoch.target_carrier[one.cause.subject])].append(one)
         elif cause in (Cause.BEND, Cause.SHAPE):
@@ -129,6 +71,8 @@ def findings(
             out.append(_scale(one, diagnosis, corrected, found))
         else:
             sync.append(one)
+    if lenses:
+        out.append(_all_lenses(lenses, diagnosis, subject))
     for carrier, group in by_carrier.items():
         out.append(_targets(carrier, group, diagnosis, found))
     if sync:
@@ -306,16 +250,22 @@ def _lens(one: Change, diagnosis: Diagnosis, found: Effects, subject: Subject) -
     )
 
 
-def _all_lenses(one: Change, diagnosis: Diagnosis, subject: Subject) -> Finding:
-    names = diagnosis.epoch.camera_names
-    share, mm = float(one.change[0]), subject.effect_mm(_by_camera(one))
+def _all_lenses(group: list[Change], diagnosis: Diagnosis, subject: Subject) -> Finding:
+    """All lenses changed alike, or all pictures were cut or resized otherwise."""
+    names = tuple(diagnosis.epoch.camera_names[k] for k in sorted(by_camera(group[0])))
+    mm = effect_of_mm(group, subject)
+    size = {one.cause.cause: one.change for one in group}
+    share = float(size.get(Cause.ALL_FOCAL, np.zeros(1))[0])
+    shift = tuple(float(v) for v in size.get(Cause.ALL_SHIFT, np.zeros(2)))
+    sentence = words.all_lenses(1e6 * share, (shift[0], shift[1]), mm)
+    worst = max(group, key=lambda one: one.statistic)
     return Finding(
         Kind.LENS_CHANGED,
         names,
-        words.all_lenses(1e6 * share, mm),
-        one.statistic,
-        one.dof,
-        one.log10_p,
+        sentence,
+        worst.statistic,
+        worst.dof,
+        worst.log10_p,
         effect_mm=mm,
         value=share,
     )

@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from calibration.check.agreement import agreeing
+from calibration.check.agreement import OFF_SIGMAS, agreeing
+from calibration.check.alike import alike, turned_back
 from calibration.check.consensus import Consensus, by_camera, consensus, misfit_px
 from calibration.check.epoch import Epoch
 from calibration.check.folders import folders_by_resection
@@ -54,16 +55,17 @@ def corrected_epoch(epoch: Epoch) -> Corrected:
 
     Raises :class:`InputError` when the targets are not in the reference's unit.
     """
-    start = consensus(epoch)
+    righted = turned_back(epoch, consensus(epoch))
+    epoch, start = righted.epoch, righted.start
+    if _is_off(epoch, start) and alike(epoch, start.state):
+        seen = tuple(int(k) for k in np.unique(epoch.camera))
+        return Corrected(epoch, start, seen, (), (), (), righted.findings)
     assigned = _assignment(epoch, start)
     cameras = _cycles(assigned)
     if cameras:
         epoch = _reassigned(epoch, assigned)
         start = consensus(epoch)
-    strange, keep = strange_pictures(epoch, agreeing(epoch, start)[0])
-    if strange:
-        epoch = epoch.with_rows(keep)
-        start = consensus(epoch)
+    epoch, start, strange = _without_strange(epoch, start)
     # A camera that is far off would bend the sizes of everything.
     scales = _scales(epoch, agreeing(epoch, start)[0])
     for carrier, scale in scales:
@@ -74,7 +76,29 @@ def corrected_epoch(epoch: Epoch) -> Corrected:
         epoch = _relabelled(epoch, ids)
         start = consensus(epoch)
     start, suspects = agreeing(epoch, start)
-    return Corrected(epoch, start, suspects, cameras, ids, scales, strange)
+    return Corrected(epoch, start, suspects, cameras, ids, scales, (*righted.findings, *strange))
+
+
+def _without_strange(
+    epoch: Epoch, start: Consensus
+) -> tuple[Epoch, Consensus, tuple[Finding, ...]]:
+    """Without pictures that are not what they are taken for: one may hide another."""
+    told: tuple[Finding, ...] = ()
+    for _ in epoch.camera_names:
+        strange, keep = strange_pictures(epoch, agreeing(epoch, start)[0])
+        if not strange:
+            break
+        told += strange
+        epoch = epoch.with_rows(keep)
+        start = consensus(epoch)
+    return epoch, start, told
+
+
+def _is_off(epoch: Epoch, start: Consensus) -> bool:
+    """Whether cameras or sizes are so far off that no linear test applies."""
+    limit = OFF_SIGMAS * float(np.median(epoch.sigma_px))
+    far = by_camera(epoch, misfit_px(epoch, start.state)) > limit
+    return bool(far.any() or (np.abs(start.scale - 1.0) > SCALE_SHARE).any())
 
 
 def _assignment(epoch: Epoch, start: Consensus) -> Ints:

@@ -28,6 +28,7 @@ class Cause(StrEnum):
     POSE = "pose"
     LENS = "lens"
     ALL_FOCAL = "all-focal"
+    ALL_SHIFT = "all-shift"
     TARGET = "target"
     SCALE = "scale"
     BEND = "bend"
@@ -41,7 +42,8 @@ class Cause(StrEnum):
 SHARES = {
     Cause.POSE: 0.30,
     Cause.LENS: 0.10,
-    Cause.ALL_FOCAL: 0.05,
+    Cause.ALL_FOCAL: 0.03,
+    Cause.ALL_SHIFT: 0.02,
     Cause.TARGET: 0.10,
     Cause.SCALE: 0.05,
     Cause.BEND: 0.05,
@@ -55,6 +57,10 @@ SHARES = {
 Within a family all members have equal parts, whatever their number."""
 
 NOISE_SHARE = 0.10
+
+
+ALL_LENSES = (Cause.ALL_FOCAL, Cause.ALL_SHIFT)
+"""What changes the pictures of all cameras alike."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,8 +123,10 @@ def _plain(subject: int, places: Ints) -> tuple[int, Ints, Floats]:
 def _cameras(epoch: Epoch, columns: Columns) -> dict[Cause, _Parts]:
     seen = [int(k) for k in np.unique(epoch.camera)]
     focal = np.array([columns.camera(k, 0, 1)[0] for k in seen])
+    axis = np.concatenate([columns.camera(k, 1, 3) for k in seen])
     return {
         Cause.ALL_FOCAL: [(0, focal, epoch.reference.interior[seen, 0][:, None])],
+        Cause.ALL_SHIFT: [(0, axis, np.tile(np.eye(2), (len(seen), 1)))],
         Cause.POSE: [_plain(k, columns.camera(k, INTERIOR, PER_CAMERA)) for k in seen],
         Cause.LENS: [_plain(k, columns.camera(k, 0, 3)) for k in seen],
     }

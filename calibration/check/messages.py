@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+MANY_PPM = 5000.0
+"""From there on people think in per cent."""
+
 
 def joined(names: tuple[str, ...] | list[str]) -> str:
     """Names as people list them."""
@@ -13,7 +16,8 @@ def joined(names: tuple[str, ...] | list[str]) -> str:
 
 def length(mm: float) -> str:
     """A length with the unit that suits it."""
-    return f"{mm * 1e3:.2g} um" if abs(mm) < 0.1 else f"{mm:.2g} mm"
+    # What rounds to 0.10 mm is told as that, not as 1e+02 um.
+    return f"{mm * 1e3:.2g} um" if abs(mm) < 0.0995 else f"{mm:.2g} mm"
 
 
 def pixels(px: float) -> str:
@@ -71,6 +75,37 @@ def turned(camera: str, degrees: int) -> str:
     )
 
 
+def on_its_side(camera: str, now_px: tuple[int, int], before_px: tuple[int, int]) -> str:
+    """Pictures whose sides are swapped."""
+    return (
+        f"The images of camera {camera} are turned by 90 degrees against the reference "
+        f"({_size(now_px)} px, not {_size(before_px)}): turn the camera or its pictures back, "
+        "then check again."
+    )
+
+
+def other_size(camera: str, now_px: tuple[int, int], before_px: tuple[int, int]) -> str:
+    """Pictures of another size."""
+    return (
+        f"The images of camera {camera} have {_size(now_px)} px, in the reference "
+        f"{_size(before_px)}, {why_of_size(now_px, before_px)}: set the camera as before, then "
+        "check again."
+    )
+
+
+def why_of_size(now_px: tuple[int, int], before_px: tuple[int, int]) -> str:
+    """What makes pictures of another size: one factor of both sides, or a cut."""
+    across, down = (now / before for now, before in zip(now_px, before_px, strict=True))
+    # A scaled side is rounded to whole pixels, down or up.
+    if abs(across / down - 1.0) <= 1.0 / min(now_px):
+        return f"as by binning or scaling by {across:.3g}"
+    return "as by another crop"
+
+
+def _size(px: tuple[int, int]) -> str:
+    return f"{px[0]} x {px[1]}"
+
+
 def mirrored(camera: str) -> str:
     """The whole picture is mirrored."""
     return (
@@ -107,6 +142,16 @@ def reversed_frames(camera: str, frames: int | None = None) -> str:
     )
 
 
+def mixed_frames(camera: str, pairs: list[tuple[str, str]]) -> str:
+    """A camera's pictures are in no order that is known; ``pairs``: its frame, the others'."""
+    told = ", ".join(f"{own} is {other} of the others" for own, other in pairs[:3])
+    more = f" and {len(pairs) - 3} more" if len(pairs) > 3 else ""
+    return (
+        f"The pictures of camera {camera} are in another order than those of the others ({told}"
+        f"{more}): pair them with the frames they belong to, then check again."
+    )
+
+
 def cropped(camera: str, shift_px: tuple[float, float], mm: float) -> str:
     """The picture is cut out of the sensor elsewhere."""
     x, y = shift_px
@@ -117,12 +162,38 @@ def cropped(camera: str, shift_px: tuple[float, float], mm: float) -> str:
     )
 
 
-def all_lenses(ppm: float, mm: float) -> str:
-    """All lenses changed alike."""
+def all_lenses(ppm: float, shift_px: tuple[float, float], mm: float) -> str:
+    """All lenses changed alike, or all pictures were cut or resized alike."""
+    x, y = shift_px
+    change = f"{ppm:+.0f} ppm" if abs(ppm) < MANY_PPM else f"{1e-4 * ppm:+.1f} %"
+    effect = f"points at the subject shift by up to {length(mm)}."
+    if not (x or y):
+        return (
+            f"The focal lengths of all cameras have changed by {change}, as by temperature "
+            f"or by pictures of another size: {effect} Let the rig reach its temperature, then "
+            "calibrate anew."
+        )
+    size = f"resized by {change} and " if ppm else ""
     return (
-        f"The focal lengths of all cameras have changed by {ppm:+.0f} ppm, as by temperature or by "
-        f"pictures of another size: points at the subject shift by up to {length(mm)}. Let the rig "
-        "reach its temperature, then calibrate anew."
+        f"The images of all cameras are {size}shifted by ({x:+.1f}, {y:+.1f}) px against the "
+        "reference, as by another crop, binning or size of all pictures: set it as before, or "
+        f"calibrate anew; {effect}"
+    )
+
+
+def all_turned(degrees: int) -> str:
+    """The pictures of all cameras are turned."""
+    return (
+        f"The images of all cameras are turned by {degrees} degrees against the reference: turn "
+        "the pictures back, then check again."
+    )
+
+
+def all_mirrored() -> str:
+    """The pictures of all cameras are mirrored."""
+    return (
+        "The images of all cameras are mirrored against the reference: switch mirroring off, "
+        "then check again."
     )
 
 

@@ -26,12 +26,9 @@ NEAR_DEG = 15.0
 FLAT_SHARE = 0.08
 """What a turn of the picture may leave, as a share of what it extends over."""
 
-FRAMES = (1, -1, 2, -2)
 AS_MANY = 0.9
-"""Two orders that explain as many points as this share of the best cannot be told apart."""
-
-GAIN = 0.2
-"""Pictures belong to other frames when they fit there by this much better."""
+"""An order explains a camera's pictures when it does so for this share of the points that fit
+in any other frame; two that do cannot be told apart."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,33 +107,56 @@ def _planar(source: Floats, target: Floats) -> tuple[Floats, float]:
 def _other_frames(
     epoch: Epoch, found: Consensus, camera: int, name: str, misfit: Floats, sure: Bools
 ) -> Finding | None:
-    """Whether the pictures belong to earlier or later frames, or run backwards."""
+    """Whether the pictures belong to earlier or later frames, run backwards, or are mixed up."""
     moving = np.flatnonzero((epoch.camera == camera) & epoch.moving[epoch.place])
     if len(moving) < LEAST_POINTS or np.median(misfit[moving]) < STRANGE_PX:
         return None
-    frame = epoch.place_frame[epoch.place[moving]]
-    last = int(epoch.place_frame.max())
-    tried = {f"{d}": frame - d for d in FRAMES}
-    tried["back"] = last - frame
-    fits: list[tuple[int, float, str]] = []
-    for word, other in tried.items():
-        there = _seen_in(epoch, found, moving, other, sure)
-        if len(there.rows) >= max(LEAST_POINTS, len(moving) // 4):
-            now = float(np.median(misfit[there.rows]))
-            ratio = float(np.median(there.misfit_px)) / max(now, 1e-9)
-            if ratio < GAIN:
-                fits.append((int((there.misfit_px < STRANGE_PX).sum()), -ratio, word))
-    if not fits:
+    fits, points = _matches(epoch, found, moving, sure)
+    # A picture that fits where it is tells nothing: so does one that was taken twice.
+    points[fits.diagonal()] = 0
+    matched = int(points[fits.any(axis=1)].sum())
+    if matched < max(LEAST_POINTS, len(moving) // 4):
         return None
-    # What explains most: in a folder of few frames another order fits some of them by chance.
-    most, _, word = max(fits)
-    shifts = [w for n, _, w in fits if w != "back" and n >= AS_MANY * most]
-    if any(w == "back" and n >= AS_MANY * most for n, _, w in fits):
-        sentence = messages.reversed_frames(name, int(shifts[0]) if shifts else None)
+    frame = np.arange(len(fits))
+    most = AS_MANY * matched
+    shifts = [d for d in sorted(_steps(len(fits)), key=abs) if _explained(fits, points, d) >= most]
+    if points[fits[frame, frame[::-1]]].sum() >= most:
+        sentence = messages.reversed_frames(name, shifts[0] if shifts else None)
         return Finding(Kind.UNSYNCHRONISED, (name,), sentence, value=float("nan"))
-    return Finding(
-        Kind.UNSYNCHRONISED, (name,), messages.out_of_step(name, int(word)), value=int(word)
-    )
+    if shifts:
+        late = messages.out_of_step(name, shifts[0])
+        return Finding(Kind.UNSYNCHRONISED, (name,), late, value=shifts[0])
+    pairs = [
+        (epoch.frame_names[f], epoch.frame_names[int(fits[f].argmax())])
+        for f in np.flatnonzero(fits.any(axis=1) & (points > 0))
+    ]
+    mixed = messages.mixed_frames(name, pairs)
+    return Finding(Kind.UNSYNCHRONISED, (name,), mixed, value=float("nan"))
+
+
+def _steps(frames: int) -> list[int]:
+    return [d for d in range(1 - frames, frames) if d]
+
+
+def _explained(fits: Bools, points: Ints, step: int) -> int:
+    """Points (frames,) of pictures that belong ``step`` frames earlier."""
+    frame = np.arange(len(fits))
+    there = (frame - step >= 0) & (frame - step < len(fits))
+    good = fits[frame[there], frame[there] - step]
+    return int(points[there][good].sum())
+
+
+def _matches(epoch: Epoch, found: Consensus, rows: Ints, sure: Bools) -> tuple[Bools, Ints]:
+    """Which pictures of a camera fit in which frames, (frames, frames), and points (frames,)."""
+    frame = epoch.place_frame[epoch.place[rows]]
+    count = int(epoch.place_frame.max()) + 1
+    fits = np.zeros((count, count), bool)
+    for step in range(1 - count, count):
+        there = _seen_in(epoch, found, rows, frame - step, sure)
+        of = epoch.place_frame[epoch.place[there.rows]]
+        for f in np.unique(of):
+            fits[f, f - step] = np.median(there.misfit_px[of == f]) < STRANGE_PX
+    return fits, np.bincount(frame, minlength=count)
 
 
 def _seen_in(epoch: Epoch, found: Consensus, rows: Ints, frame: Ints, sure: Bools) -> _Frames:

@@ -13,11 +13,12 @@ from calibration.adjustment.camera import INTERIOR, PER_CAMERA
 from calibration.adjustment.reliability import DELTA0
 from calibration.adjustment.residualgrid import residual_grid
 from calibration.adjustment.result import Calibration
+from calibration.check.changes import LOG10, changes
 from calibration.check.condition import LEAST_POINTS
 from calibration.check.consensus import Consensus
 from calibration.check.diagnosis import Diagnosis
 from calibration.check.effects import Effects, sensitivity
-from calibration.check.findings import LOG10, changes, scale_estimate
+from calibration.check.findings import scale_estimate
 from calibration.check.hypotheses import ALPHA, NOISE_SHARE, Cause
 from calibration.check.linear import Columns
 from calibration.check.scores import estimate
