@@ -175,7 +175,10 @@ class Profile(Part):
 
 @dataclass(frozen=True, kw_only=True)
 class Bracket(Part):
-    """What joins profiles of the ``series`` named, or a profile and a head."""
+    """What joins profiles of the ``series`` named, or a profile and a head, or carries them.
+
+    ``height_mm`` of a levelling foot: from the floor to what it is screwed to, least and greatest.
+    """
 
     series: tuple[str, ...]
     size_mm: SizeOf | None = None
@@ -185,6 +188,8 @@ class Bracket(Part):
     angle_deg: PairOf | None = None
     step_deg: float | None = None
     thread: str | None = None
+    height_mm: PairOf | None = None
+    load_kg: float | None = None
     mass_g: float | None = None
 
 

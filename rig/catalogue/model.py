@@ -214,9 +214,11 @@ class ProfileEntry(Entry):
 class BracketEntry(Entry):
     """A bracket or joint."""
 
-    kind: Literal["corner", "pivot", "head-plate", "clamp", "stand", "end-cap", "strip"] = Field(
+    kind: Literal[
+        "corner", "pivot", "head-plate", "clamp", "stand", "end-cap", "strip", "levelling-foot"
+    ] = Field(
         description="Kind of bracket; a stand carries a head over the floor, an end cap closes a "
-        "profile, a strip joins two where they meet at an angle."
+        "profile, a strip joins two where they meet at an angle, a frame stands on levelling feet."
     )
     series: list[Words] = Field(description="Profile series it fits.")
     size_mm: Vector | None = Field(
@@ -230,8 +232,14 @@ class BracketEntry(Entry):
     angle_deg: Pair | None = Field(default=None, description="Range of its angle.")
     step_deg: Positive | None = Field(default=None, description="What it can be set to.")
     thread: Words | None = Field(
-        default=None, description="Thread of the stud for a head, of a head plate or a stand."
+        default=None,
+        description="Thread of the stud for a head, of a head plate or a stand; of a levelling "
+        "foot that of its own stud.",
     )
+    height_mm: Pair | None = Field(
+        default=None, description="Of a levelling foot: least and greatest height it is turned to."
+    )
+    load_kg: Positive | None = Field(default=None, description="What a levelling foot carries.")
     mass_g: Positive | None = Field(default=None, description="Mass.")
 
 

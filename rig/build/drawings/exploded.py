@@ -27,7 +27,7 @@ CROP_MM = 90.0
 APART_SHARE = 0.7
 """How far what is joined is drawn apart, as a share of :data:`CROP_MM`; brackets go half as far."""
 
-GRIDS = ((1, 1), (2, 1), (2, 2), (3, 2))
+GRIDS = ((1, 1), (2, 1), (2, 2), (3, 2), (4, 2))
 """Columns and rows of a sheet: the first that holds all joints, or the last on more sheets."""
 
 LINE_MM, TEXT_MM = 3.6, 2.2

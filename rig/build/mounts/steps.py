@@ -7,7 +7,15 @@ from dataclasses import replace
 
 from rig.build.mounts.plan import Sag, set_for_weight
 from rig.build.mounts.settings import CameraMount, Setting
-from rig.build.mounts.structure import Joint, Member, Plate, Structure, Wedge, joint_side
+from rig.build.mounts.structure import (
+    Joint,
+    Member,
+    Plate,
+    Structure,
+    Wedge,
+    joint_side,
+    levelling_feet,
+)
 from rig.build.parts.screws import screw_mm
 from rig.catalogue import Catalogue
 
@@ -33,9 +41,15 @@ def assembly_steps(
     own = {m.name: {part for part in m.carried_by if part.startswith(f"{m.name} ")} for m in mounts}
     of_one = {m.name for m in mounts}.union(*own.values())
     members = {member.id: member for member in structure.members}
+    level = {joint.id: _join(joint, members) for _, joint, _ in levelling_feet(structure)}
+    if level:
+        steps.append(f"Put on the levelling feet: {'; '.join(level.values())}.")
     steps += [
-        f"J{_join(j, members)[1:]}." for j in structure.joints if not {j.on, j.other} & of_one
+        f"J{_join(j, members)[1:]}."
+        for j in structure.joints
+        if j.id not in level and not {j.on, j.other} & of_one
     ]
+    steps += [_level(structure, catalogue)] if level else []
     steps.append(
         "Set up the subject's head form or a pointer at the datum, and check that the mount stands "
         "level and square to it."
@@ -58,6 +72,20 @@ def assembly_steps(
 def _cut(members: tuple[Member, ...]) -> str:
     pieces = "; ".join(f"{m.id} {m.part} {m.length_mm:.0f} mm{_mitred(m)}" for m in members)
     return f"Cut to length: {pieces}."
+
+
+def _level(structure: Structure, catalogue: Catalogue) -> str:
+    """How the levelling feet are set: all to one height, then as the floor asks."""
+    feet = list(levelling_feet(structure))
+    _, joint, part = feet[0]
+    height = float(joint.point_mm[2] - part.rig_from_part[2, 3])
+    words = f"Turn the pad of every levelling foot to {height:.0f} mm from the floor to its member"
+    if (span := catalogue.brackets[part.part].height_mm) is not None:
+        words += f" ({span[0]:.0f} to {span[1]:.0f} mm can be set)"
+    last = [member.id for member, _, _ in feet if member.role == "upright"]
+    words += ", level the frame by those under its feet, highest place of the floor first"
+    words += f", then run those under {', '.join(last)} down until they touch" if last else ""
+    return f"{words}, and tighten their lock nuts."
 
 
 def _mitred(member: Member) -> str:

@@ -6,12 +6,15 @@ entry of the catalogue, or empty for what is made for this rig (a plate, a print
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from geometry.arrays import Floats, frozen
+
+LEVELLING = "levelling foot"
+"""Role of the part on which a member stands."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,3 +229,13 @@ class Structure:
     parts: tuple[PlacedPart, ...]
     joints: tuple[Joint, ...]
     solids: tuple[Solid, ...]
+
+
+def levelling_feet(structure: Structure) -> Iterator[tuple[Member, Joint, PlacedPart]]:
+    """Each levelling foot with its member and its joint; its part's origin is on the floor."""
+    members = {member.id: member for member in structure.members}
+    joints = {joint.id: joint for joint in structure.joints}
+    for part in structure.parts:
+        if part.role == LEVELLING:
+            joint = joints[part.joint]
+            yield members[joint.on], joint, part

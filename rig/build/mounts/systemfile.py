@@ -121,6 +121,10 @@ class SystemFile(StrictModel):
         description="Build in back-stays, and a larger profile where none is named, if cameras "
         "would lean.",
     )
+    levelling_feet: bool = Field(
+        default=True,
+        description="Stand a frame, an arc or a plate on levelling feet; else on its members.",
+    )
     currency: str = Field(default="EUR", max_length=8, description="Currency of the prices.")
 
     def to_spec(self, catalogue: Catalogue) -> SystemSpec:
@@ -162,7 +166,9 @@ class SystemFile(StrictModel):
     def _system(self, catalogue: Catalogue, profile: Profile | None = None) -> MountSystem:
         profile = profile or profile_named(self.profile or _PROFILES[self.kind], catalogue)
         if self.kind == "plate":
-            return plate_of(profile, self.thickness_mm, self.material, catalogue)
+            return plate_of(
+                profile, self.thickness_mm, self.material, catalogue, level=self.levelling_feet
+            )
         head = HeadKind.named(self.head, catalogue)
         if self.head_step_deg is not None:
             head = replace(head, step_deg=self.head_step_deg)
@@ -172,7 +178,7 @@ class SystemFile(StrictModel):
                 stand.thread, head.part.base_thread, f"head {head.part.id}", catalogue
             )
             return TripodSystem(stand, head, adapter, self.floor_step_mm, self.slot_step_mm)
-        parts = outrigger_of(profile, head, catalogue)
+        parts = outrigger_of(profile, head, catalogue, level=self.levelling_feet)
         if self.kind == "arc":
             strip = bracket_for(profile, "strip", catalogue)
             return ArcSystem(parts, strip, self.slot_step_mm, self.share_mm, self.radius_mm)

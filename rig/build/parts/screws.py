@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
-from rig.build.mounts.structure import Joint, Member, Structure
+from rig.build.mounts.structure import Joint, Member, Structure, levelling_feet
 from rig.catalogue import Catalogue
 from rig.catalogue.items import Bracket
 
@@ -59,7 +60,7 @@ def screw_mm(joint: Joint, structure: Structure, catalogue: Catalogue) -> float 
 
 
 def taps(structure: Structure, catalogue: Catalogue) -> tuple[Tap, ...]:
-    """Every bore that screws through a plate are screwed into."""
+    """Every bore that screws through a plate, or the studs of levelling feet, are screwed into."""
     members = {member.id: member for member in structure.members}
     found = []
     for joint in structure.joints:
@@ -73,7 +74,17 @@ def taps(structure: Structure, catalogue: Catalogue) -> tuple[Tap, ...]:
         thread = next(catalogue.fasteners[part].thread for part in joint.fasteners
                       if part in catalogue.fasteners)  # fmt: skip
         found.append(Tap(member.id, member.start, bores, thread, depth))
-    return tuple(found)
+    return (*found, *_foot_taps(structure, catalogue))
+
+
+def _foot_taps(structure: Structure, catalogue: Catalogue) -> Iterator[Tap]:
+    """The core bore over each levelling foot that no nut in a slot holds."""
+    for member, joint, part in levelling_feet(structure):
+        thread = catalogue.brackets[part.part].thread
+        sizes = [f.diameter_mm for f in catalogue.fasteners.values()
+                 if f.thread == thread and f.diameter_mm is not None]  # fmt: skip
+        if not joint.fasteners and thread and sizes:
+            yield Tap(member.id, member.start, 1, thread, IN_ALUMINIUM * sizes[0] + BEYOND_MM)
 
 
 def end_caps(structure: Structure, catalogue: Catalogue) -> dict[str, int]:

@@ -1,7 +1,8 @@
 """The frame of beams that a structure is: members, the joints between them, plates, feet.
 
 Joints, heads, wedges and cameras are taken as rigid, profiles as beams along their middle lines,
-a plate as a grid of strips. A structure stands on the ends of its feet.
+a plate as a grid of strips. A structure stands on the levelling feet under its feet, or on the ends
+of these; what is run down under an upright may come off the floor, and is not counted on.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import numpy as np
 
 from common.errors import InputError
 from geometry.arrays import Floats
-from rig.build.mounts.structure import Joint, Member, Plate, Structure
+from rig.build.mounts.structure import Joint, Member, Plate, Structure, levelling_feet
 from rig.build.statics.beams import Beam, Frame, Section
 from rig.build.statics.materials import RIGID, member_section, strip_section
 from rig.catalogue import Catalogue
@@ -69,7 +70,7 @@ def frame_of(structure: Structure, catalogue: Catalogue) -> StructureFrame:
     plates = {p.id: p for p in structure.plates}
     beams: list[Beam] = []
     grids = {p.id: _grid(p, nodes, beams) for p in structure.plates}
-    feet = _feet(structure.members, nodes)
+    feet = _feet(structure, nodes)
     if not feet:
         raise InputError("frame-feet", "the structure has no feet", "plan it with a mount that has")
     held: dict[tuple[str, str], int] = {}
@@ -134,9 +135,15 @@ def _edge_links(
             yield nodes.on(member, along), _nearest(nodes, grids[plate.id], at)
 
 
-def _feet(members: tuple[Member, ...], nodes: _Nodes) -> list[int]:
-    feet = [m for m in members if m.role.split()[-1] == FOOT]
-    return [nodes.on(foot, along) for foot in feet for along in (0.0, _length(foot))]
+def _feet(structure: Structure, nodes: _Nodes) -> list[int]:
+    """The nodes that a structure stands on."""
+    feet = [m for m in structure.members if m.role.split()[-1] == FOOT]
+    level = [
+        nodes.on(member, nearest_along(member, joint.point_mm))
+        for member, joint, _ in levelling_feet(structure)
+        if member in feet
+    ]
+    return level or [nodes.on(foot, along) for foot in feet for along in (0.0, _length(foot))]
 
 
 def _divided(member: Member, section: Section, nodes: _Nodes) -> list[Beam]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +13,7 @@ from geometry.camera import RigCamera
 from rig.build.mounts.clashes import find_clashes
 from rig.build.mounts.plan import Stance
 from rig.build.mounts.settings import CameraMount
-from rig.build.mounts.structure import Structure
+from rig.build.mounts.structure import Structure, levelling_feet
 from rig.build.mounts.surroundings import Surroundings
 from rig.build.mounts.systems.base import Built, Holding, Spread
 from rig.build.statics.stiffening import Stiffened
@@ -78,7 +79,26 @@ def settled_stances(
         found = stances(structure, mounts, datum_mm, masses)
     except InputError as error:
         return (), (f"Whether it tips over is not known: {error.problem}; {error.remedy}.",)
-    return found, tuple(f"It tips: {remedy(stance)}." for stance in found if not stance.stands)
+    tips = (f"It tips: {remedy(stance)}." for stance in found if not stance.stands)
+    return found, (*tips, *_overloaded(structure, found, masses))
+
+
+def _overloaded(structure: Structure, found: tuple[Stance, ...], masses: Masses) -> Iterator[str]:
+    """What stands on levelling feet of which one does not carry it all.
+
+    On uneven floor, or pushed, it stands on few of them; on one never with more than its weight.
+    """
+    for stance in found:
+        parts = {part.part for member, _, part in levelling_feet(structure)
+                 if member.id in stance.on}  # fmt: skip
+        for part in sorted(parts):
+            load = masses.catalogue.brackets[part].load_kg
+            if load is not None and stance.mass_kg > load:
+                yield (
+                    f"{stance.mass_kg:.0f} kg stand on {' and '.join(stance.on)}, whose levelling "
+                    f"feet {part} carry {load:g} kg each: use stronger ones, or set levelling_feet "
+                    "= false."
+                )
 
 
 def remedy(stance: Stance) -> str:

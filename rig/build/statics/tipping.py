@@ -13,7 +13,7 @@ from common.errors import InputError
 from geometry.arrays import Floats
 from rig.build.mounts.plan import GRAVITY_M_S2, Stance
 from rig.build.mounts.settings import CameraMount
-from rig.build.mounts.structure import Structure
+from rig.build.mounts.structure import Structure, levelling_feet
 from rig.build.parts.bill import plate_mass_g
 from rig.build.statics.framing import FOOT
 from rig.build.statics.materials import member_section
@@ -40,12 +40,13 @@ def stances(
 ) -> tuple[Stance, ...]:
     """One for each part that stands by itself; empty for mounts without members.
 
-    Pushed at the height of the datum (3,), about the edges of what lies on the floor. Raises
+    Pushed at the height of the datum (3,), about the edges of what lies on the floor, of levelling
+    feet about their middles: a pad swivels on its stud. Raises
     :class:`InputError` where a profile's or a plate's mass is not known.
     """
     if not structure.members:
         return ()
-    corners = {s.owner: s.corners_mm for s in structure.solids if s.kind == "member"}
+    corners = _on_floor(structure)
     floor = min(float(c[:, 2].min()) for c in corners.values())
     found = []
     for body in _bodies(structure):
@@ -65,9 +66,20 @@ def stances(
     return tuple(found)
 
 
+def _on_floor(structure: Structure) -> dict[str, Floats]:
+    """Points (N, 3) on which members may stand, by member."""
+    level: dict[str, list[Floats]] = {}
+    for member, _, part in levelling_feet(structure):
+        level.setdefault(member.id, []).append(part.rig_from_part[:3, 3])
+    if level:
+        return {member: np.stack(points) for member, points in level.items()}
+    return {s.owner: s.corners_mm for s in structure.solids if s.kind == "member"}
+
+
 def _least_inside(foot_mm: Floats, centre_mm: Floats) -> tuple[float, Floats]:
     """How far a point (2,) lies inside the hull of a foot (N, 2), and towards which edge."""
-    if len(foot_mm) < 3:
+    # Two, or several in a row, are no base: it falls over their line.
+    if np.linalg.matrix_rank(foot_mm - foot_mm.mean(axis=0), tol=FLOOR_MM) < 2:
         return 0.0, np.array([0.0, 1.0])
     edges = ConvexHull(foot_mm).equations
     inside = -(edges[:, :2] @ centre_mm + edges[:, 2])

@@ -26,6 +26,7 @@ from rig.build.mounts.systems.base import USUAL, Built, Spread
 from rig.build.mounts.systems.corners import leg_mm, unplaced, with_corners
 from rig.build.mounts.systems.hanging import Rail, hang_all
 from rig.build.mounts.systems.heads import HeadKind
+from rig.build.mounts.systems.levelling import base_z_mm, levelled
 from rig.build.mounts.systems.outrigger import Hung, Outrigger, Z
 from rig.build.mounts.systems.pivots import pivot_arm_mm, pivot_part
 from rig.build.mounts.systems.ribs import Facet, Rib, bend_id, strips
@@ -220,8 +221,9 @@ class ArcHolding:
         parts = (*(p for h in self.hung for p in h.placed()), *placed, *stays.parts)
         structure = Structure(tuple(members), (), (), parts, tuple(joints), tuple(solids))
         mounts = tuple(self._measured(h) for h in self.hung)
+        structure, joined = levelled(structure, pairs(*touching), self.system.outrigger.levelling)
         structure, joined = with_corners(
-            structure, pairs(*touching), self.system.outrigger.corner,
+            structure, joined, self.system.outrigger.corner,
             tuple(m.camera for m in mounts), self.around,
         )  # fmt: skip
         return Built(structure, mounts, joined, unplaced(structure, self.system.outrigger.corner))
@@ -246,7 +248,7 @@ class ArcHolding:
         size = (profile.width_mm, profile.height_mm)
         back = float((rib.axes.T @ (self._hinge(rib)[1] - rib.centre_mm))[1])
         back -= self._arm_mm + profile.height_mm / 2.0
-        floor = self.around.floor_z_mm - rib.centre_mm[2]
+        floor = base_z_mm(self.around, self.system.outrigger.levelling) - rib.centre_mm[2]
         high = float(rib.corner(rib.count)[2] - rib.centre_mm[2])
 
         def member(role: str, start: list[float], end: list[float]) -> Member:

@@ -26,6 +26,10 @@ LEG_MM = 4.0
 TOUCH_MM = 1.0
 """Faces that lie no further apart than this meet: members are cut to whole millimetres."""
 
+OVER_END_MM = 3.5
+"""How far a bracket may reach over the end of a member: its screw is in its middle, and of a
+bracket 18 mm wide the nut, 10 mm long, ends 4 mm before its edge."""
+
 SAME_MM = 0.6
 """Slots of two members that are no further apart than this are one line for a bracket."""
 
@@ -94,7 +98,7 @@ def _along(one: _Box, other: _Box, bracket: Bracket) -> Iterator[Floats]:
         theirs = away[edge] + other.slots(own)
         places = np.array([p for p in places if np.abs(theirs - p).min() < SAME_MM])
     else:
-        within = np.abs(places - away[edge]) <= half[edge] - bracket_half(bracket) + TOUCH_MM
+        within = np.abs(places - away[edge]) <= half[edge] - bracket_half(bracket) + OVER_END_MM
         places = places[within]
     length = leg_mm(bracket)[0]
     for place in sorted(places.tolist(), key=abs):

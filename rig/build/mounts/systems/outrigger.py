@@ -20,6 +20,7 @@ from rig.build.mounts.solids import bar, box, carried
 from rig.build.mounts.structure import Joint, Member, PlacedPart, Solid
 from rig.build.mounts.systems.corners import leg_mm
 from rig.build.mounts.systems.heads import HeadKind, head_id
+from rig.build.mounts.systems.levelling import Levelling
 from rig.build.mounts.systems.pivots import pivot_arm_mm, pivot_part
 from rig.build.mounts.systems.stays import StayParts
 from rig.build.mounts.systems.threads import counted, height_mm
@@ -33,6 +34,11 @@ LONGEST_ARM_MM = 900.0
 LONGEST_STUB_MM = 400.0
 STUB_END_MM = 5.0
 """How far a stub reaches past the last bracket on it."""
+
+SET_ROOM_MM = 4.0
+"""From the rear end of an arm to its rail: so much less the reach can be set, which it is where a
+frame leans forward under its weight. A millimetre more leaves the nuts of its brackets, on the
+middle line of the stub, the 5 mm of the arm that they need."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +64,10 @@ FOOTINGS = tuple(
 
 @dataclass(frozen=True, eq=False)
 class Outrigger:
-    """Sizes of the parts that carry one camera; ``side`` 1: the arm lies over the stub."""
+    """Sizes of the parts that carry one camera; ``side`` 1: the arm lies over the stub.
+
+    ``levelling``: what the frame of the same profile stands on; None: on the floor.
+    """
 
     profile: Profile
     plate: Bracket
@@ -68,6 +77,7 @@ class Outrigger:
     screw: str
     head: HeadKind
     adapter: Fastener | None = None
+    levelling: Levelling | None = None
 
     @property
     def size_mm(self) -> tuple[float, float]:
@@ -169,8 +179,8 @@ class Hung:
         )
         low = float(np.floor(ends[0]))
         stub_axis = np.array([[low, stub_y, 0.0], [low + np.ceil(ends[1] - low), stub_y, 0.0]])
-        # Rounded down: a longer one would run into the rail behind the stub.
-        length = np.floor(values["reach"] + part.width_mm + 1e-6)
+        # Off the rail behind the stub, by no more than rounding up leaves of it.
+        length = np.ceil(values["reach"] + part.width_mm - SET_ROOM_MM - 1e-6)
         end = front[:3, 3]
         arm_axis = np.array([end - length * front[:3, 1], end])
         size = (part.width_mm, part.height_mm)

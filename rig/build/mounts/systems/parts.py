@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from common.errors import InputError
 from rig.build.mounts.systems.heads import HeadKind
+from rig.build.mounts.systems.levelling import Levelling
 from rig.build.mounts.systems.outrigger import Outrigger
 from rig.build.mounts.systems.plate import PlateSystem
 from rig.build.mounts.systems.threads import adapter_for
@@ -41,6 +42,14 @@ def bracket_for(
     return next((b for b in fitting if thread and b.thread == thread), fitting[0])
 
 
+def levelling_for(profile: Profile, catalogue: Catalogue) -> Levelling | None:
+    """What a frame of a profile stands on; None where the catalogue has no foot for it."""
+    for part in catalogue.brackets.values():
+        if part.kind == "levelling-foot" and profile.series in part.series and part.height_mm:
+            return Levelling(part, t_nut_for(profile, catalogue))
+    return None
+
+
 def t_nut_for(profile: Profile, catalogue: Catalogue) -> str:
     """Id of the T-nut for a profile's slot: of its series, or with its bolt's thread."""
     nuts = [f for f in catalogue.fasteners.values() if f.kind == "t-nut"]
@@ -69,8 +78,10 @@ def screw_for(thread: str | None, catalogue: Catalogue) -> str:
     )
 
 
-def outrigger_of(profile: Profile, head: HeadKind, catalogue: Catalogue) -> Outrigger:
-    """Stub, arm, plate and head of one profile."""
+def outrigger_of(
+    profile: Profile, head: HeadKind, catalogue: Catalogue, *, level: bool = True
+) -> Outrigger:
+    """Stub, arm, plate and head of one profile; ``level``: on levelling feet."""
     thread = head.part.base_thread
     plate = bracket_for(profile, "head-plate", catalogue, thread)
     return Outrigger(
@@ -82,11 +93,17 @@ def outrigger_of(profile: Profile, head: HeadKind, catalogue: Catalogue) -> Outr
         t_nut=t_nut_for(profile, catalogue),
         screw=screw_for(profile.bolt, catalogue),
         head=head,
+        levelling=levelling_for(profile, catalogue) if level else None,
     )
 
 
 def plate_of(
-    profile: Profile, thickness_mm: float, material: str, catalogue: Catalogue
+    profile: Profile,
+    thickness_mm: float,
+    material: str,
+    catalogue: Catalogue,
+    *,
+    level: bool = True,
 ) -> PlateSystem:
     """A plate whose posts are of a profile with two core bores side by side."""
     if profile.height_mm < 1.5 * profile.width_mm:
@@ -105,6 +122,7 @@ def plate_of(
         thickness_mm=thickness_mm,
         material=material,
         catalogue=catalogue,
+        levelling=levelling_for(profile, catalogue) if level else None,
     )
 
 

@@ -28,6 +28,7 @@ from rig.build.mounts.surroundings import Surroundings
 from rig.build.mounts.systems.base import USUAL, Built, Spread
 from rig.build.mounts.systems.corners import unplaced, with_corners
 from rig.build.mounts.systems.fits import CAMERA_SCREW, SCREW_HOLES_MM, Fitter, WedgeFit
+from rig.build.mounts.systems.levelling import Levelling, base_z_mm, levelled
 from rig.build.mounts.systems.posts import LONGEST_POST_MM, Posted, X, Y, Z, post_for
 from rig.build.mounts.systems.stays import StayParts, Stays, stayed
 from rig.build.mounts.tolerancing import MADE_DEG, MADE_MM
@@ -61,6 +62,7 @@ class PlateSystem:
     thickness_mm: float
     material: str
     catalogue: Catalogue
+    levelling: Levelling | None = None
     stays: bool = False
     spread: Spread = USUAL
     kind: str = "plate"
@@ -184,8 +186,9 @@ class PlateHolding:
         touching += stays.touching()
         structure = Structure(members, (plate,), wedges, stays.parts, joints, tuple(solids))
         mounts = tuple(self._measured(p) for p in self.posted)
+        structure, joined = levelled(structure, pairs(*touching), self.system.levelling)
         structure, joined = with_corners(
-            structure, pairs(*touching), self.system.corner, tuple(m.camera for m in mounts),
+            structure, joined, self.system.corner, tuple(m.camera for m in mounts),
             self.around,
         )  # fmt: skip
         return Built(structure, mounts, joined, unplaced(structure, self.system.corner))
@@ -227,7 +230,7 @@ class PlateHolding:
         profile = self.system.profile
         size = (profile.width_mm, profile.height_mm)
         depth = -self.system.thickness_mm - profile.height_mm / 2.0
-        floor = self.around.floor_z_mm - float(self.face[2, 3])
+        floor = base_z_mm(self.around, self.system.levelling) - float(self.face[2, 3])
         out = []
         for name, x in (("left", high[0]), ("right", low[0])):
             at = x + (-profile.width_mm / 2.0 if x > 0.0 else profile.width_mm / 2.0)

@@ -25,6 +25,7 @@ from rig.build.mounts.systems.base import USUAL, Built, Spread
 from rig.build.mounts.systems.corners import leg_mm, unplaced, with_corners
 from rig.build.mounts.systems.hanging import Rail, hang_all, spread_order
 from rig.build.mounts.systems.heads import HeadKind
+from rig.build.mounts.systems.levelling import base_z_mm, levelled
 from rig.build.mounts.systems.outrigger import Hung, Outrigger, X, Y, Z
 from rig.build.mounts.systems.stays import Stays, stayed
 from rig.build.mounts.systems.ties import tied
@@ -129,7 +130,7 @@ class _Bays:
     def _upright(self, bay: Bay, across_mm: float) -> Upright:
         axes, datum = bay.axes(), self._around.datum_mm
         foot = datum + axes @ np.array([across_mm, bay.plane_mm, 0.0])
-        foot[2] = self._around.floor_z_mm
+        foot[2] = base_z_mm(self._around, self._system.outrigger.levelling)
         profile = self._system.outrigger.profile
         name = f"U{len(self.uprights) + 1}"
         at = rotated(axes, foot)
@@ -172,7 +173,7 @@ class TSlotSystem:
 
     def hold(self, cameras: tuple[RigCamera, ...], around: Surroundings) -> TSlotHolding:
         """See :class:`rig.build.mounts.systems.base.MountSystem`."""
-        bay_of = _bays(cameras, around)
+        bay_of = _bays(cameras, around, base_z_mm(around, self.outrigger.levelling))
         bays = _Bays(self, bay_of, around)
         order = spread_order(cameras)
         hung = hang_all(cameras, around, bays, self.outrigger, self.step_mm, order)
@@ -180,15 +181,18 @@ class TSlotSystem:
         return TSlotHolding(self, hung, tuple(bays.uprights), used, around)
 
 
-def _bays(cameras: tuple[RigCamera, ...], around: Surroundings) -> dict[str, Bay]:
-    """The bay of each camera by name; all bays are as tall as the highest camera needs."""
+def _bays(cameras: tuple[RigCamera, ...], around: Surroundings, base_mm: float) -> dict[str, Bay]:
+    """The bay of each camera by name; all bays are as tall as the highest camera needs.
+
+    ``base_mm``: height of their undersides.
+    """
     index_of: dict[str, int] = {}
     for camera in cameras:
         away = camera.pose.position_rig_mm - around.centroid_mm
         azimuth = float(np.degrees(np.arctan2(away[0], -away[1])))
         quarter = 0 if abs(azimuth) <= SIDE_DEG else int(np.round(azimuth / 90.0))
         index_of[camera.name] = quarter % 4
-    top = max(float(c.pose.position_rig_mm[2]) for c in cameras) - around.floor_z_mm
+    top = max(float(c.pose.position_rig_mm[2]) for c in cameras) - base_mm
     length = float(np.ceil((top + 2.0 * OVER_MM) / 10.0) * 10.0)
     bays = {}
     for index in sorted(set(index_of.values())):
@@ -262,8 +266,9 @@ class TSlotHolding:
         parts = (*(p for h in self.hung for p in h.placed()), *stays.parts)
         structure = Structure(tuple(members), (), (), parts, tuple(joints), tuple(solids))
         mounts = tuple(self._measured(h) for h in self.hung)
+        structure, joined = levelled(structure, pairs(*touching), self.system.outrigger.levelling)
         structure, joined = with_corners(
-            structure, pairs(*touching), self.system.outrigger.corner,
+            structure, joined, self.system.outrigger.corner,
             tuple(m.camera for m in mounts), self.around,
         )  # fmt: skip
         return Built(structure, mounts, joined, unplaced(structure, self.system.outrigger.corner))
@@ -301,7 +306,7 @@ class TSlotHolding:
         width, height = part.width_mm, part.height_mm
         low, high = self._ends(bay)
         back = bay.plane_mm - height / 2.0 - width / 2.0
-        floor = self.around.floor_z_mm - self.around.datum_mm[2]
+        floor = base_z_mm(self.around, self.system.outrigger.levelling) - self.around.datum_mm[2]
         forward = FOOT_MM[1] if len(self.bays) == 1 else SHORT_FOOT_MM
         forward += self.system.spread.front_mm
 

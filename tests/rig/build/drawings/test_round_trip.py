@@ -85,6 +85,9 @@ def settings_agree(plan: MountPlan, index: int, lines: list[str]) -> None:
     mount = plan.mounts[index]
     values = read.settings_in(lines)
     assert set(values) == {s.name for s in mount.settings}
+    # Set is what the rig sinks by under its weight, too: without that weight it is not there.
+    for give in (give for sag in plan.sags if sag.camera == mount.name for give in sag.gives):
+        values[give.setting] -= give.set_more
     agree(mount, values)
 
 

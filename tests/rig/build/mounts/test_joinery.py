@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from held_mounts import held
 
+from rig.build.mounts.rounding import nearest
 from rig.build.mounts.shapes import ConvexShape, gap_mm
 from rig.build.mounts.steps import assembly_steps
 from rig.build.mounts.structure import Member
@@ -84,3 +85,32 @@ def test_facets_are_mitred_where_they_meet_and_square_at_the_ends_of_their_rib()
     assert first.long_side_mm == pytest.approx(first.length_mm + more)
     text = " ".join(assembly_steps(built("arc").structure, built("arc").mounts, CATALOGUE))
     assert f"saw turned by 0.0 degrees at its {first.start} and {first.mitres_deg[1]:.1f}" in text
+
+
+@pytest.mark.parametrize("kind", ["t-slot", "arc"])
+def test_an_arm_can_be_set_less_far_as_its_weight_asks_and_further(kind: str) -> None:
+    """Arms ended flush with their upright: of a frame that leans forward, they are to be set less.
+
+    By 3 mm on this arc.
+    """
+    holding = held(kind)
+    made = holding.with_mounts(tuple(nearest(mount) for mount in holding.mounts)).build()
+    members = {m.id: m for m in made.structure.members}
+    solids = {s.owner: s.corners_mm for s in made.structure.solids if s.kind == "member"}
+    for mount in made.mounts:
+        step = next(s.step for s in mount.settings if s.name == "reach")
+        arm, stub = members[f"{mount.name} arm"], members[f"{mount.name} stub"]
+        along = (arm.axis_mm[1] - arm.axis_mm[0]) / arm.length_mm
+        rail = next(i for i in mount.carried_by if i in members and members[i].role in
+                    ("upright", "facet") and i in ends_of(made, stub.id))  # fmt: skip
+        for steps in (-4.0, -3.0, -1.0, 1.0):
+            moved = ConvexShape(solids[arm.id] + steps * step * along)
+            assert gap_mm(moved, ConvexShape(solids[rail]), 1.0) > -1e-6, arm.id
+            # The nuts of its brackets, 10 mm long, are on the middle line of the stub.
+            behind = (stub.axis_mm[0] - arm.axis_mm[0] - steps * step * along) @ along
+            assert behind >= 5.0 - 1e-9, arm.id
+
+
+def ends_of(made: Built, stub: str) -> set[str]:
+    """What a stub is screwed to."""
+    return {joint.on for joint in made.structure.joints if joint.other == stub}

@@ -59,22 +59,27 @@ def test_lengths_follow_from_what_a_screw_goes_through() -> None:
 
 def test_posts_are_tapped_as_deep_as_their_screws_reach() -> None:
     found = taps(plan("plate").structure, CATALOGUE)
-    assert [t.member for t in found] == [f"{m.name} post" for m in plan("plate").mounts]
-    # A screw of 20 mm through 10 mm of plate, and 4 mm for the tap.
-    assert {(t.bores, t.thread, t.depth_mm) for t in found} == {(2, "M5", 14.0)}
-    assert taps(plan("t-slot").structure, CATALOGUE) == ()
+    posts = [f"{m.name} post" for m in plan("plate").mounts]
+    assert [t.member for t in found] == [*posts, "left upright", "right upright"]
+    # A screw of 20 mm through 10 mm of plate, and 4 mm for the tap; a stud twice its 5 mm deep.
+    assert {(t.bores, t.thread, t.depth_mm) for t in found[:-2]} == {(2, "M5", 14.0)}
+    assert {(t.bores, t.thread, t.depth_mm) for t in found[-2:]} == {(1, "M5", 14.0)}
+    uprights = [m.id for m in plan("t-slot").structure.members if m.role == "upright"]
+    assert [t.member for t in taps(plan("t-slot").structure, CATALOGUE)] == uprights
 
 
 def test_open_ends_are_capped_and_closed_ones_are_not() -> None:
     members = plan("plate").structure.members
     posts = len(plan("plate").mounts)
+    # The lower ends of both uprights have a levelling foot.
     assert end_caps(plan("plate").structure, CATALOGUE) == {
-        "end-cap-2040": 2 * len(members) - posts
+        "end-cap-2040": 2 * len(members) - posts - 2
     }
     arc = plan("arc").structure
     mitred = sum(mitre > 0.0 for m in arc.members for mitre in m.mitres_deg)
-    assert mitred > 0
-    assert end_caps(arc, CATALOGUE) == {"end-cap-2020": 2 * len(arc.members) - mitred}
+    footed = sum(member.role == "upright" for member in arc.members)
+    assert mitred > 0 and footed > 0
+    assert end_caps(arc, CATALOGUE) == {"end-cap-2020": 2 * len(arc.members) - mitred - footed}
 
 
 def cut(*lengths: float) -> MountPlan:

@@ -11,7 +11,7 @@ from held_mounts import held
 from Pynite import FEModel3D
 
 from geometry.arrays import Floats
-from rig.build.mounts.structure import Member, Structure
+from rig.build.mounts.structure import Member, Structure, levelling_feet
 from rig.build.mounts.systems.base import Built
 from rig.build.parts.masses import small_part_g
 from rig.build.parts.screws import screw_mm
@@ -49,9 +49,11 @@ class OtherFrame:
             for one, other in itertools.pairwise(along):
                 if np.linalg.norm(other - one) > NEAR_MM:
                     self._bar(one, other, *self._section(member))
-            if member.role.split()[-1] == "foot":
-                for end in member.axis_mm:
-                    self.model.def_support(self.node(end), True, True, True, False, False, False)
+        feet = {m.id for m in structure.members if m.role.split()[-1] == "foot"}
+        for member, _, part in levelling_feet(structure):
+            if member.id in feet:
+                at = nearest(member, part.rig_from_part[:3, 3])
+                self.model.def_support(self.node(at), True, True, True, False, False, False)
 
     def node(self, point: Floats) -> str:
         for k, place in enumerate(self.places):
