@@ -76,6 +76,7 @@ LENSES: dict[str, tuple[tuple[Camera, LensModel], ...]] = {
     "barrel": ((lens(47.0, BARREL), LensModel.BROWN),),
     "equidistant": (
         (lens(47.0, EQUIDISTANT), LensModel.RATIONAL),
+        (lens(55.0, EQUIDISTANT), LensModel.FISHEYE),
         (lens(60.0, EQUIDISTANT), LensModel.FISHEYE),
         (lens(60.0, EQUIDISTANT), LensModel.BROWN),
     ),

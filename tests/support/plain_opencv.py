@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
@@ -58,8 +59,21 @@ def fisheye_flag(name: str) -> int:
     return int(getattr(cv2.fisheye, f"CALIB_{name}", None) or getattr(cv2, f"CALIB_{name}"))
 
 
+@dataclass(frozen=True)
+class Pair:
+    """Two cameras after OpenCV: their distance, and what its fit of each left, rms of a point."""
+
+    base_mm: float
+    rms_px: float
+
+
 def opencvs_base_mm(seen: Observations, lens: LensModel) -> float:
     """The distance of both cameras after OpenCV, from the corners that both see."""
+    return opencvs_pair(seen, lens).base_mm
+
+
+def opencvs_pair(seen: Observations, lens: LensModel) -> Pair:
+    """Both cameras after OpenCV, from the corners that both see."""
     nominal = seen.targets.carriers[0].nominal_mm
     shown: tuple[list[Floats], list[Floats], list[Floats]] = ([], [], [])
     for frame in range(len(seen.frames)):
@@ -79,7 +93,7 @@ def opencvs_base_mm(seen: Observations, lens: LensModel) -> float:
             np.array([[0.56 * width, 0, middle[0]], [0, 0.56 * width, middle[1]], [0, 0, 1.0]])
             for _ in (0, 1)
         ]
-        flags, poses = sum(map(fisheye_flag, FISHEYE_FLAGS)), []
+        flags, poses, left = sum(map(fisheye_flag, FISHEYE_FLAGS)), [], []
         for k in (0, 1):
             found = cv2.fisheye.calibrate(
                 shown[0], shown[1 + k], size, start[k], np.zeros(4), flags=flags
@@ -87,14 +101,17 @@ def opencvs_base_mm(seen: Observations, lens: LensModel) -> float:
             turns = [cv2.Rodrigues(v)[0] for v in found[3]]
             centres = [-r.T @ np.ravel(t) for r, t in zip(turns, found[4], strict=True)]
             poses.append(np.array(centres))
-        return float(np.median(np.linalg.norm(poses[1] - poses[0], axis=1)))
+            left.append(found[0])
+        base_mm = float(np.median(np.linalg.norm(poses[1] - poses[0], axis=1)))
+        return Pair(base_mm, float(np.sqrt(np.mean(np.square(left)))))
     single = [[np.asarray(v, np.float32) for v in part] for part in shown]
     flags = cv2.CALIB_RATIONAL_MODEL if lens is LensModel.RATIONAL else 0
     lenses = [cv2.calibrateCamera(single[0], p, size, None, None, flags=flags) for p in single[1:]]
     found = cv2.stereoCalibrate(
         *single, lenses[0][1], lenses[0][2], lenses[1][1], lenses[1][2], size, flags=flags
     )
-    return float(np.linalg.norm(found[6]))
+    left = np.square([one[0] for one in lenses])
+    return Pair(float(np.linalg.norm(found[6])), float(np.sqrt(left.mean())))
 
 
 def video_frames(path: Path) -> Iterator[Bytes]:
