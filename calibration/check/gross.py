@@ -14,6 +14,7 @@ from calibration.check.consensus import Consensus, by_camera, consensus, misfit_
 from calibration.check.epoch import Epoch
 from calibration.check.folders import folders_by_resection
 from calibration.check.pictures import strange_pictures
+from calibration.check.placing import placed_by_pairs
 from calibration.check.verdicts import Finding
 from common.errors import InputError
 from geometry.arrays import Bools, Floats, Ints
@@ -86,6 +87,8 @@ def _without_strange(
     told: tuple[Finding, ...] = ()
     for _ in epoch.camera_names:
         strange, keep = strange_pictures(epoch, agreeing(epoch, start)[0])
+        if not strange:
+            strange, keep = strange_pictures(epoch, placed_by_pairs(epoch, start))
         if not strange:
             break
         told += strange

@@ -80,6 +80,8 @@ class _Body:
         if self._limit is not None and self._bytes > self._limit:
             raise Refusal(_too_large(self._limit))
         self._whole = not message.get("more_body", False)
+        if not self._whole:
+            self._go_on()
         return message
 
     async def _in_time(self) -> Message:
@@ -88,22 +90,25 @@ class _Body:
         try:
             while not waiting.done():
                 await asyncio.wait([waiting], timeout=_LOOK_EVERY_S)
-                now_s = time.monotonic()
                 if waiting.done():
                     break
-                if self._stopping():
-                    raise Refusal(_stops())
-                if now_s - last_s > self._pause_s or self._dawdles(now_s):
+                self._go_on()
+                if time.monotonic() - last_s > self._pause_s:
                     raise Refusal(_too_slow())
             return waiting.result()
         finally:
             waiting.cancel()
 
-    def _dawdles(self, now_s: float) -> bool:
-        took_s = now_s - self._began_s
-        return took_s > self._pause_s and self._bytes < _LEAST_BYTES_PER_S * (
-            took_s - self._pause_s
-        )
+    def _go_on(self) -> None:
+        """Whether more of a body is worth waiting for, also where it drips and never pauses.
+
+        Raises what the request is to be answered with.
+        """
+        if self._stopping():
+            raise Refusal(_stops())
+        late_s = time.monotonic() - self._began_s - self._pause_s
+        if late_s > 0.0 and self._bytes < _LEAST_BYTES_PER_S * late_s:
+            raise Refusal(_too_slow())
 
 
 def _too_slow() -> InputError:

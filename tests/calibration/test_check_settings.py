@@ -134,12 +134,22 @@ def with_order(orders: dict[int, tuple[int, ...]]) -> Scene:
     return replace(SCENE, seen_otherwise=other)
 
 
+LATE, EARLY = (0, 0, 1, 2), (1, 2, 3, 3)
+
+
 @pytest.mark.parametrize(
-    "late", [{1: (0, 0, 1, 2), 3: (0, 0, 1, 2)}, {1: (0, 0, 1, 2), 3: (1, 2, 3, 3)}]
+    "late",
+    [
+        {1: LATE, 3: LATE},
+        {1: LATE, 3: EARLY},
+        # Of three cameras that see the plate one is late: the middle of their rays is spoiled.
+        {0: LATE, 4: EARLY},
+        {1: EARLY, 4: LATE},
+    ],
 )
 def test_two_cameras_of_other_frames_are_both_told(late: dict[int, tuple[int, ...]]) -> None:
     result = checked(with_order(late).observe(0.1, 41))
-    only(result, Kind.UNSYNCHRONISED, {"cam2", "cam4"}, "pair them with the frames")
+    only(result, Kind.UNSYNCHRONISED, {NAMES[k] for k in late}, "pair them with the frames")
     assert len(result.findings) == 2
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import socket
+import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -10,7 +12,7 @@ from service_helpers import MARKED, LiveServer, StartServer, TestClient
 
 from service.api.app import create_app
 from service.api.context import Service
-from service.api.limits import LARGEST_BODY_BYTES
+from service.api.limits import LARGEST_BODY_BYTES, PAUSE_S
 from service.kinds.queued import QUEUED
 from service.settings import read_settings
 
@@ -156,6 +158,33 @@ def test_the_service_stops_at_once_while_requests_are_half_sent(start_server: St
     assert "Traceback" not in server.log.read_text()
     for one in (*slow, *silent):
         one.close()
+
+
+def dripped(server: LiveServer, for_s: float) -> bytes:
+    """What comes back to a body that never pauses and never ends."""
+    opened = half_sent(server, HEAD.replace("1000", "1000000"))
+    opened.settimeout(0.1)
+    until_s = time.monotonic() + for_s
+    with opened:
+        while time.monotonic() < until_s:
+            try:
+                opened.sendall(b" ")
+                return opened.recv(4096)
+            except TimeoutError:
+                continue
+    return b""
+
+
+@pytest.mark.slow
+def test_a_body_that_drips_does_not_hold_the_service(start_server: StartServer) -> None:
+    server = start_server()
+    with ThreadPoolExecutor(1) as pool:
+        # 10 bytes a second are less than 1000; the first 20 s are for slow lines.
+        assert b"408" in dripped(server, PAUSE_S + 10.0).splitlines()[0]
+        answer = pool.submit(dripped, server, 20.0)
+        time.sleep(1.0)
+        assert server.stop_took_s() < 5.0
+        assert b"503" in answer.result().splitlines()[0]
 
 
 @pytest.mark.slow
