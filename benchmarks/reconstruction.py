@@ -4,7 +4,9 @@
 takes the cameras of ``--design DESIGN.json``; without a head the bundled one is photographed. With
 ``--calibrated`` there is a second column: the same pictures with poses and lenses that are not
 known but found from captures of targets that the same simulated cameras took; that cloud is put
-onto the head by best fit (rigid, no scale). ``--half`` halves the pictures, ``--stride`` is the
+onto the head by best fit (rigid, no scale). With ``--blender PROGRAM`` (Blender, or a Python with
+its module ``bpy``) there is a column for pictures of the same rig that Blender rendered, with
+``--samples`` rays a pixel. ``--half`` halves the pictures, ``--stride`` is the
 pixels between points. ``--kept FOLDER`` keeps
 pictures there, and takes those that are there already: of the same design, head and studio only.
 """
@@ -34,6 +36,7 @@ from evaluation.reconstruction.volume import common_volume
 from evaluation.trial.trying import judged
 from geometry.camera import RigCamera
 from rig.design.designfile import read_design
+from rig.simulation.blender.photographing import BlenderPhotographer
 from rig.simulation.settings import HeadSettings, SceneSettings
 from rig.simulation.studio import Shot, Studio
 
@@ -61,6 +64,10 @@ def main() -> None:
             "known cameras": known,
             "calibrated": figures_of(images, found, cameras, truth, options, fit=True),
         }
+    if chosen.blender is not None:
+        blender = BlenderPhotographer(chosen.blender, chosen.samples)
+        other = rendered_by_blender(studio, blender, chosen.kept)
+        columns["by Blender"] = figures_of(other, cameras, cameras, truth, options)
     rows = [(name, *(column[name] for column in columns.values())) for name in known]
     print(table(("figure", *columns), rows))
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
@@ -71,6 +78,8 @@ def _chosen() -> argparse.Namespace:
     parser = sized_arguments(__doc__)
     parser.add_argument("--calibrated", action="store_true")
     parser.add_argument("--captures", type=int, default=12)
+    parser.add_argument("--blender", metavar="PROGRAM")
+    parser.add_argument("--samples", type=int, default=BlenderPhotographer().samples)
     return parser.parse_args()
 
 
@@ -80,6 +89,26 @@ def photographs(studio: Studio, kept: Path | None) -> list[Coded]:
         photographed(studio, Shot(name, EXPOSURE_US, seed=(1, number)), kept)
         for number, name in enumerate(studio.cameras)
     ]
+
+
+def rendered_by_blender(
+    studio: Studio, blender: BlenderPhotographer, kept: Path | None
+) -> list[Coded]:
+    """The head as Blender shows it to each camera."""
+    found = []
+    for number, name in enumerate(studio.cameras):
+        width, height = studio.cameras[name].camera.image_size_px
+        kind = f"blender-{blender.samples}-{width}x{height}"
+        file = None if kept is None else kept / f"{name}-{kind}.npy"
+        if file is None or not file.exists():
+            shot = Shot(name, EXPOSURE_US, seed=(1, number))
+            picture = blender(studio, [shot])[0]
+            if file is not None:
+                np.save(file, picture)
+        else:
+            picture = np.load(file)
+        found.append(np.asarray(picture, dtype=np.uint8))
+    return found
 
 
 def figures_of(

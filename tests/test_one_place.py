@@ -56,6 +56,7 @@ OPENCV = {
     "rig/acquisition/cameras/workers/opencv_driver.py",
     "rig/acquisition/imaging.py",
     "rig/acquisition/timingboard/reading.py",
+    "rig/simulation/blender/handoff.py",
     "rig/simulation/defocus.py",
     "rig/simulation/flats.py",
     "rig/simulation/heads.py",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,12 +24,13 @@ from evaluation.reconstruction.reconstructing import (
     ReconstructionOptions,
     reconstruct,
 )
-from evaluation.reconstruction.views import View, view_of
+from evaluation.reconstruction.views import view_of
 from evaluation.trial.regions import RegionFigures, region_figures
 from evaluation.trial.seen import seen_by_two
 from geometry.arrays import Floats
 from geometry.camera import RigCamera
 from geometry.raycast import Occluder
+from rig.acquisition.cameras.base import Image
 from rig.simulation.settings import SceneSettings
 from rig.simulation.studio import Shot, Studio
 
@@ -40,6 +41,27 @@ PHOTOGRAPHED, RECONSTRUCTED = 0.55, 0.9
 """How far the work has come: pictures of a studio take longest."""
 
 SAMPLE_MM = 0.5
+
+Photographer = Callable[
+    [Studio, Sequence[Shot], ProgressCallback, CancelToken | None], Sequence[Image]
+]
+"""Takes a picture for each shot of a studio's head."""
+
+
+def by_the_studio(
+    studio: Studio,
+    shots: Sequence[Shot],
+    progress: ProgressCallback = ignore_progress,
+    cancel: CancelToken | None = None,
+) -> list[Image]:
+    """Pictures by the studio's own renderer."""
+    stop = cancel or NeverCancelled()
+    images = []
+    for number, shot in enumerate(shots):
+        go_on(stop)
+        progress(Progress("photographing", number / len(shots)))
+        images.append(studio.photograph(shot))
+    return images
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +87,7 @@ def try_rig(
     exposure: str = "right",
     radius_mm: float = 95.0,
     options: ReconstructionOptions | None = None,
+    photographer: Photographer = by_the_studio,
     progress: ProgressCallback = ignore_progress,
     cancel: CancelToken | None = None,
 ) -> Trial:
@@ -78,26 +101,20 @@ def try_rig(
     surface = studio.surface
     if surface is None:
         raise InputError("trial-head", "the scene has no head to measure", "give a head")
-    views = _photographed(studio, EXPOSURES[exposure], progress, stop)
+    exposure_us = EXPOSURES[exposure] * studio.sensor.reference_exposure_us
+    shots = [
+        Shot(name, exposure_us, seed=(1, number)) for number, name in enumerate(studio.cameras)
+    ]
+    photographing = within(progress, 0.0, PHOTOGRAPHED)
+    images = photographer(studio, shots, photographing, stop)
+    seeing = zip(images, studio.cameras.values(), strict=True)
+    views = [view_of(image, camera) for image, camera in seeing]
     matching = within(progress, PHOTOGRAPHED, RECONSTRUCTED, "matching")
     chosen = options or ReconstructionOptions()
     done = reconstruct(views, options=chosen, progress=matching, cancel=stop)
     progress(Progress("comparing", RECONSTRUCTED))
     truth = Reference(surface.vertices_mm, surface.faces)
     return judged(done, truth, cameras, radius_mm)
-
-
-def _photographed(
-    studio: Studio, times: float, progress: ProgressCallback, cancel: CancelToken
-) -> list[View]:
-    views = []
-    exposure_us = times * studio.sensor.reference_exposure_us
-    for number, camera in enumerate(studio.cameras.values()):
-        go_on(cancel)
-        progress(Progress("photographing", PHOTOGRAPHED * number / len(studio.cameras)))
-        image = studio.photograph(Shot(camera.name, exposure_us, seed=(1, number)))
-        views.append(view_of(image, camera))
-    return views
 
 
 def judged(

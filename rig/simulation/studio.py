@@ -88,15 +88,17 @@ class Studio:
 
     def photograph(self, shot: Shot) -> Image:
         """Take one photograph: (H, W) or (H, W, 3) RGB, 8 or 16 bits."""
+        return self.developed(shot, self.light(shot))
+
+    def developed(self, shot: Shot, light: Singles) -> Image:
+        """The photograph that a shot's sensor makes of the light on it, (H, W, C)."""
         rig_camera = self._camera(shot)
-        table = self._tables.of(rig_camera.camera)
         f_number = shot.f_number or rig_camera.camera.f_number
         reference = self.sensor.reference_f_number or rig_camera.camera.f_number
         stop = shot.exposure_us / self.sensor.reference_exposure_us * (reference / f_number) ** 2
-        light = self.light(shot)
         return developed(
             light,
-            table,
+            self._tables.of(rig_camera.camera),
             self.sensor,
             exposure=0.0 if shot.black else stop,
             gain=10.0 ** (shot.gain_db / 20.0),

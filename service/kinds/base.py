@@ -55,6 +55,7 @@ class RunContext(Model):
     ``session`` and its ``captures`` (all without any), or the folder ``pictures``: where pictures
     are that come as no input file. ``cache``: a folder where finished parts are found and kept.
     ``cluster``: the address of who computes them, instead of processes of this machine.
+    ``blender``: the program that photographs instead of the simulated studio.
     """
 
     workers: int = 1
@@ -66,6 +67,7 @@ class RunContext(Model):
     pictures: str | None = None
     cache: str | None = None
     cluster: str | None = None
+    blender: str | None = None
 
 
 RequestT = TypeVar("RequestT", bound=Request)

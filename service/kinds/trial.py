@@ -36,6 +36,9 @@ class TrialRequest(Request):
         ),
     ] = 90.0
     scale_mm: Annotated[float, Field(gt=0.0, description="End of the colour scale.")] = 0.2
+    samples: Annotated[
+        int, Field(ge=1, le=4096, description="Rays for each pixel, where Blender photographs.")
+    ] = 64
     flip_texture: Annotated[
         bool, Field(description="The texture's picture stands upside down.")
     ] = False

@@ -11,9 +11,10 @@ from evaluation.comparison.comparing import Figures
 from evaluation.extras import igl, require_numba
 from evaluation.reconstruction.cloudfile import write_cloud, write_distances
 from evaluation.report.trialpage import trial_page
-from evaluation.trial.trying import Trial, try_rig
+from evaluation.trial.trying import Photographer, Trial, by_the_studio, try_rig
 from geometry.scanoptions import ScanOptions
 from rig.design.designfile import ReadDesign, read_design
+from rig.simulation.blender.photographing import BlenderPhotographer
 from rig.simulation.settings import HeadSettings, SceneSettings
 from service.jobs.engine import Running, Task
 from service.kinds.comparison import Share
@@ -42,6 +43,7 @@ def trial(task: Task[TrialRequest, TrialResult], running: Running) -> TrialResul
         exposure=request.exposure,
         radius_mm=request.radius_mm,
         options=matching_options(design, request.stride_px, task.run.workers),
+        photographer=_photographer(task),
         progress=running.report,
         cancel=running.cancel,
     )
@@ -49,10 +51,17 @@ def trial(task: Task[TrialRequest, TrialResult], running: Running) -> TrialResul
     result = _result(done, request, len(design.cameras))
     _write(task.folder, done)
     title = request.name or f"Trial of {design.name}"
-    page = trial_page(done, title, result.verdict, _facts(result, request), request.scale_mm)
+    page = trial_page(done, title, result.verdict, _facts(result, task), request.scale_mm)
     (task.folder / "report.html").write_text(page, encoding="utf-8")
     running.report(Progress("done", 1.0))
     return result
+
+
+def _photographer(task: Task[TrialRequest, TrialResult]) -> Photographer:
+    program = task.run.blender
+    if program is None:
+        return by_the_studio
+    return BlenderPhotographer(program, task.request.samples, task.run.workers)
 
 
 def _head(task: Task[TrialRequest, TrialResult], design: ReadDesign) -> HeadSettings:
@@ -137,9 +146,13 @@ def _result(done: Trial, request: TrialRequest, cameras: int) -> TrialResult:
     )
 
 
-def _facts(result: TrialResult, request: TrialRequest) -> list[str]:
+def _facts(result: TrialResult, task: Task[TrialRequest, TrialResult]) -> list[str]:
+    request = task.request
+    light = "the simulated studio"
+    if task.run.blender is not None:
+        light = f"Blender, {request.samples} rays a pixel"
     return [
-        f"{result.cameras} simulated cameras at their designed places, exposure "
+        f"{result.cameras} simulated cameras at their designed places, light by {light}, exposure "
         f"{request.exposure}; judged within {request.radius_mm:g} mm of the nose's tip, of which "
         f"two cameras see {result.seen_percent:.1f} %. Poses and lenses are taken to be known."
     ]

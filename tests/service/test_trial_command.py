@@ -100,3 +100,12 @@ def test_what_cannot_be_tried_is_one_line(design: Path, tmp_path: Path) -> None:
     assert "exposure" in said
     said = one_line_and_nothing_left(design, "trial", "design.json")
     assert "--scan" in said or "head" in said
+
+
+def test_a_blender_that_is_not_there_is_one_line(design: Path) -> None:
+    pytest.importorskip("numba")
+    pytest.importorskip("igl")
+    told = one_line_and_nothing_left(
+        design, "trial", "design.json", "--head", "head.ply", "--blender", "./none", here=True
+    )
+    assert "./none cannot be run: No such file or directory" in told

@@ -50,6 +50,17 @@ def trial(
     least_reached: Annotated[
         float, typer.Option(metavar="PERCENT", help="Least share that has a point within 0.5 mm.")
     ] = 90.0,
+    blender: Annotated[
+        str | None,
+        typer.Option(
+            metavar="PROGRAM",
+            help="Photograph with Blender, or with a Python that has its module bpy.",
+            show_default=False,
+        ),
+    ] = None,
+    samples: Annotated[
+        int, typer.Option(min=1, max=4096, help="Rays for each pixel, with --blender.")
+    ] = 64,
     name: Annotated[str, typer.Option(help="What to call it.")] = "",
     workers: WorkersOption = None,
     as_json: JsonOption = False,
@@ -79,13 +90,13 @@ def trial(
         asked = {
             "name": name, "exposure": exposure, "radius_mm": radius, "stride_px": stride,
             "limit_rms_mm": limit_rms, "least_reached_percent": least_reached,
-            "flip_texture": flip_texture, "subdivisions": subdivisions,
+            "flip_texture": flip_texture, "subdivisions": subdivisions, "samples": samples,
         }  # fmt: skip
         request = validated(TrialRequest, asked, "the trial")
         inputs = {"design": design, "head": head or scan_of(design)}
         more = {"texture": texture, "displacement": displacement}
         inputs |= {role: path for role, path in more.items() if path is not None}
-        run = RunContext(workers=processes(workers))
+        run = RunContext(workers=processes(workers), blender=blender)
         with new_folder(out, force=force, spare=inputs.values()) as folder:
             result = run_task(TRIAL, request, inputs, folder, run)
         if as_json:
