@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields
+from functools import lru_cache
 
 import numpy as np
 
@@ -157,8 +158,13 @@ def synthetic_head(shape: HeadShape | None = None, seed: int = 0) -> Scan:
     ``seed`` varies the surface by a fraction of a millimetre, as no two faces are smooth in the
     same way; the measures are those of ``shape``.
     """
-    chosen = shape or HeadShape()
-    measures = _measures(chosen)
+    return _made(shape or HeadShape(), seed)
+
+
+@lru_cache(maxsize=2)
+def _made(shape: HeadShape, seed: int) -> Scan:
+    """Cached: it takes two seconds, and simulated cameras, studies and designs ask for the same."""
+    measures = _measures(shape)
     relief = _relief(seed)
 
     def field(points: Floats) -> Floats:
@@ -167,7 +173,7 @@ def synthetic_head(shape: HeadShape | None = None, seed: int = 0) -> Scan:
     axes = _grid(measures)
     vertices, faces = largest_piece(*surface_nets(unambiguous(grid_values(field, axes)), axes))
     vertices = settle(vertices, field)
-    vertices = vertices * _stretch(chosen)
+    vertices = vertices * _stretch(shape)
     note = ScanNote("inferred", f"synthetic head, seed {seed}: millimetres, in the rig frame")
     return Scan(vertices, faces, vertex_normals(vertices, faces), (note,))
 

@@ -22,7 +22,8 @@ from geometry.scanoptions import ScanOptions
 from geometry.sniffing import KINDS
 
 OBJECT = ScanOptions(subject="object", units="mm")
-IN_RIG_FRAME = ScanOptions(units="mm", up="+z", front="-y")
+IN_RIG_FRAME = ScanOptions(subject="object", units="mm", up="+z", front="-y")
+"""Where the face is is not asked: to find it takes longer than to read the file."""
 
 
 def kinds_of(scan: Scan) -> set[str]:

@@ -13,6 +13,7 @@ import trimesh
 from service_helpers import HERE, ROOT, LiveServer, StartServer, TestClient
 
 from service.api.context import Service
+from service.jobs.engine import Engine
 from service.jobs.process import ProcessEngine
 from service.kinds.queued import QUEUED
 from service.settings import read_settings
@@ -84,11 +85,16 @@ def head_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def service(tmp_path: Path) -> Iterator[Service]:
+def engine() -> Engine:
+    """What does the tasks of ``service``: processes, unless a module says otherwise."""
+    return ProcessEngine(program="counting_job")
+
+
+@pytest.fixture
+def service(tmp_path: Path, engine: Engine) -> Iterator[Service]:
     settings = read_settings(
         data_dir=tmp_path / "data", max_upload_bytes=2 << 20, workers_per_job=1
     )
-    engine = ProcessEngine(settings.cancel_grace_s, "counting_job")
     opened = Service(settings, {**QUEUED, **counting_job.KINDS}, engine)
     yield opened
     opened.close()

@@ -10,12 +10,18 @@ from pathlib import Path
 import pytest
 import trimesh
 from scanfiles import plain_head
-from service_helpers import TestClient, files_under, one_line_and_nothing_left
+from service_helpers import InThisProcess, TestClient, files_under, one_line_and_nothing_left
 
 from rig.specification.examples import example_text
 from service.api.context import Service
 
 RIG = "rig.toml"
+
+
+@pytest.fixture
+def engine() -> InThisProcess:
+    """Every kind of input is asked about: a process for each takes a second."""
+    return InThisProcess()
 
 
 def zipped(path: Path) -> None:

@@ -9,15 +9,22 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from service_helpers import TestClient, files_under
+from service_helpers import InThisProcess, TestClient, files_under
 
 from common.errors import InputError, RigwrightError, TooLargeError
 from service.api.context import Service
+from service.jobs.process import ProcessEngine
 from service.pictures import archive
 from service.pictures.archive import archive_facts, unpack
 from service.pictures.listing import pictures_in_folder
 
 PIXEL = b"P5 1 1 255\n\x00"
+
+
+@pytest.fixture
+def engine() -> InThisProcess:
+    """What an archive holds is asked about here: a process for each takes half a second."""
+    return InThisProcess()
 
 
 def packed(*names: str, content: bytes = PIXEL, method: int = zipfile.ZIP_STORED) -> bytes:
@@ -160,6 +167,7 @@ def test_no_archive_writes_outside_its_folder(
     assert outside == []
 
 
+@pytest.mark.parametrize("engine", [ProcessEngine()], ids=["a process"])
 def test_a_picture_set_over_http(client: TestClient, service: Service) -> None:
     content = packed("cam01/1.png", "cam01/2.png", "cam02/1.png")
     answer = client.post("/v1/picture-sets?filename=../my%20set.zip", content=content)

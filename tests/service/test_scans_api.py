@@ -9,11 +9,18 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 import pytest
-from service_helpers import StartServer, TestClient, files_under, wait_for
+from service_helpers import InThisProcess, StartServer, TestClient, files_under, wait_for
 
 from service.api.app import create_app
 from service.api.context import Service
+from service.jobs.process import ProcessEngine
 from service.settings import read_settings
+
+
+@pytest.fixture
+def engine() -> InThisProcess:
+    """Refusals and the store are what is asked about here: a process for each takes a second."""
+    return InThisProcess()
 
 
 def upload(client: TestClient, path: Path, **more: object) -> object:
@@ -28,6 +35,7 @@ def nothing_stays(service: Service) -> bool:
     return not any(files_under(folder / name) for name in ("blobs", "tmp", "work"))
 
 
+@pytest.mark.parametrize("engine", [ProcessEngine()], ids=["a process"])
 def test_a_scan_goes_in_and_what_was_inferred_comes_back(
     client: TestClient, head_file: Path
 ) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -30,11 +31,20 @@ def layout(design: Design, subject: Subject) -> Layout:
     return make_layout(design.cameras, subject, design.limits)
 
 
-def test_all_files_are_written(
-    tmp_path: Path, design: Design, layout: Layout, prepared: PreparedSubject
-) -> None:
-    out = tmp_path / "deep" / "out"
-    paths = write_design_folder(out, design, layout, prepared, example_rig("face"), "head.glb")
+@pytest.fixture(scope="module")
+def written(
+    tmp_path_factory: pytest.TempPathFactory,
+    design: Design,
+    layout: Layout,
+    prepared: PreparedSubject,
+) -> dict[str, Path]:
+    """The files of a design, written into a folder that was not there; not to be changed."""
+    out = tmp_path_factory.mktemp("written") / "deep" / "out"
+    return write_design_folder(out, design, layout, prepared, example_rig("face"), "head.glb")
+
+
+def test_all_files_are_written(written: dict[str, Path]) -> None:
+    paths, out = written, written["design.json"].parent
     assert tuple(paths) == FILE_NAMES == tuple(MEDIA_TYPES)
     assert sorted(p.name for p in out.iterdir()) == sorted(FILE_NAMES)
     assert [p.name for p in out.parent.iterdir()] == ["out"], "nothing half-written stays"
@@ -45,20 +55,27 @@ def test_all_files_are_written(
 
 
 def test_the_same_design_gives_the_same_bytes(
-    tmp_path: Path, design: Design, layout: Layout, prepared: PreparedSubject
+    tmp_path: Path,
+    written: dict[str, Path],
+    design: Design,
+    layout: Layout,
+    prepared: PreparedSubject,
 ) -> None:
     spec = example_rig("face")
-    one = write_design_folder(tmp_path / "a", design, layout, prepared, spec)
-    other = write_design_folder(tmp_path / "b", design, layout, prepared, spec)
+    other = write_design_folder(tmp_path / "b", design, layout, prepared, spec, "head.glb")
     for name in FILE_NAMES:
-        assert one[name].read_bytes() == other[name].read_bytes(), name
+        assert written[name].read_bytes() == other[name].read_bytes(), name
 
 
 def test_a_former_design_is_replaced_and_other_files_are_not(
-    tmp_path: Path, design: Design, layout: Layout, prepared: PreparedSubject
+    tmp_path: Path,
+    written: dict[str, Path],
+    design: Design,
+    layout: Layout,
+    prepared: PreparedSubject,
 ) -> None:
     out, spec = tmp_path / "out", example_rig("face")
-    write_design_folder(out, design, layout, prepared, spec)
+    shutil.copytree(written["design.json"].parent, out)
     (out / "report.html").write_text("old")
     write_design_folder(out, design, layout, prepared, spec)
     assert (out / "report.html").stat().st_size > 1000
