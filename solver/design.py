@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -23,7 +23,7 @@ from solver.outer_loop import StartResult
 from solver.pool import StartJob
 from solver.problem import Problem, camera_at
 from solver.quality import evaluate
-from solver.refinement import HOPELESS_COST, optimality_error, refine
+from solver.refinement import optimality_error, refine
 from solver.request import Request
 from solver.result import NOBODY, Design, Quality, Relaxation, SolverReport, StartReport, Status
 from solver.search.bound import bound_of
@@ -38,8 +38,8 @@ _EXPECTED_OUTER_ITERATIONS = 8
 _SOLVED = 0.9
 """Fraction of the work at which all starts are solved."""
 
-_REFINEMENT_COST = 1.01
-"""A refinement may cost so much; beyond ``HOPELESS_COST`` no more points are named to mend it."""
+_REFINEMENT_COST, _HOPELESS_COST = 1.002, 1.03
+"""A refinement may cost so much; beyond the second no more points are named to mend it."""
 
 _REFINEMENT_TRIES = 3
 _MOST_NAMED = 100
@@ -249,16 +249,11 @@ def _finish(
         if worth or refined.rank < quality.rank:
             return outcome.values, refined, outcome.kkt_error, outcome.why, outcome.iterations
         why = f"{result.why}; the last digits with each view held cost more than they give"
-        if quality.feasible and refined.cost_mm2 > HOPELESS_COST * quality.cost_mm2:
+        if quality.feasible and refined.cost_mm2 > _HOPELESS_COST * quality.cost_mm2:
             break
         judged = judge(problem, problem.unknowns.state(outcome.values))
-        result = replace(
-            result,
-            added_points=np.unique(
-                np.concatenate([result.added_points, judged.missed, _worsened(quality, refined)])
-            ),
-            margins=result.margins.wider(judged.shortfall),
-        )
+        named = np.union1d(judged.missed, _worsened(quality, refined))
+        result = result.naming(named, judged.shortfall)
     return result.values, quality, optimality_error(problem, result), why, 0
 
 

@@ -160,14 +160,19 @@ class CovarianceCost:
         rays = _rays(state, self.points, self.weight)
         if (rays.z <= 0.0).any():
             return float("nan")
+        return float(self._norms(rays, state).mean() / self.scale)
+
+    def norms(self, state: NetworkState) -> Floats:
+        """Norm (p,) of the covariance of each point, whatever the ``scale``."""
+        return self._norms(_rays(state, self.points, self.weight), state)
+
+    def _norms(self, rays: _Rays, state: NetworkState) -> Floats:
         q = np.linalg.inv(symmetric(_normal_entries(rays, state.axis, self.prior)))
-        return float(np.sqrt(np.einsum("pkm,pkm->p", q, q)).mean() / self.scale)
+        return np.asarray(np.sqrt(np.einsum("pkm,pkm->p", q, q)))
 
     def typical(self, state: NetworkState) -> float:
         """Median norm of the covariances: what the cost is made of when no point is lost."""
-        rays = _rays(state, self.points, self.weight)
-        q = np.linalg.inv(symmetric(_normal_entries(rays, state.axis, self.prior)))
-        return float(np.median(np.sqrt(np.einsum("pkm,pkm->p", q, q))))
+        return float(np.median(self.norms(state)))
 
     def gradient(self, state: NetworkState) -> Floats:
         """Derivative of :meth:`value` by all unknowns, (7 n,)."""

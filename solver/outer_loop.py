@@ -40,6 +40,7 @@ from solver.formulation import (
 from solver.nlp.program import NonlinearProgram
 from solver.nlp.sqp import FIRST_RADIUS, Outcome, minimise
 from solver.problem import Problem
+from solver.short_move import Held
 from solver.workers import Report
 
 MAX_OUTER_ITERATIONS = 12
@@ -60,7 +61,7 @@ class StartResult:
 
     ``added_points`` are check points that had to be named for more views, ``margins`` what was
     assigned beyond the limits, ``reach`` how far cameras were expected to move: whoever goes on
-    from here has to ask for the same.
+    from here has to ask for the same. ``held`` is what a network that was moved shortly held on to.
     """
 
     values: Floats
@@ -73,6 +74,16 @@ class StartResult:
     added_points: Ints
     margins: Margins
     reach: Reach = FAR
+    held: Held | None = None
+
+    def naming(self, points: Ints, shortfall: float) -> StartResult:
+        """With check points named that fell short by a share, or were worsened."""
+        return replace(
+            self,
+            added_points=np.union1d(self.added_points, points),
+            margins=self.margins.wider(shortfall),
+            held=None if self.held is None else self.held.naming(points),
+        )
 
 
 class Monitor:

@@ -201,6 +201,11 @@ def with_points(problem: Problem, missed: Ints) -> Problem:
     )
 
 
+def framed_at(problem: Problem, state: NetworkState) -> Bools:
+    """Check points (n, q) that each camera sees, in some head position at least."""
+    return _to_be_framed(problem, state, NOWHERE)
+
+
 def _to_be_framed(problem: Problem, state: NetworkState, reach: Reach) -> Bools:
     """Check points (n, q) that may be seen in some head position."""
     source = problem.subject.check_points

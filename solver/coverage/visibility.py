@@ -33,8 +33,13 @@ class Visibility:
 
 def cosines(points: SurfacePoints, eye_mm: Floats) -> Floats:
     """Cosine of the angle between each point's normal and the ray to the eye, (p,)."""
-    ray = eye_mm - points.points_mm
-    return np.asarray(np.einsum("pk,pk->p", points.normals, ray) / np.linalg.norm(ray, axis=1))
+    return cosines_of(points.points_mm, points.normals, eye_mm)
+
+
+def cosines_of(points_mm: Floats, normals: Floats, eyes_mm: Floats) -> Floats:
+    """Cosine (p,) of the angle between normals (p, 3) and the rays to eyes (3,) or (p, 3)."""
+    ray = eyes_mm - points_mm
+    return np.asarray(np.einsum("pk,pk->p", normals, ray) / np.linalg.norm(ray, axis=1))
 
 
 def cast_rays(

@@ -14,16 +14,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.progress import NeverCancelled
+from geometry.arrays import Floats
 from solver import near_optimum
-from solver.coverage.cuts import VisibilityCuts
 from solver.coverage.views import NEAR, judge
 from solver.formulation import Merit, unknown_bounds
 from solver.limits import BaseHeight, Coverage, CoverageTier, PoseBounds
 from solver.near_optimum import FIRST_BOX, LARGEST_BOX, MAX_MOVES, run_near
 from solver.nlp.sqp import Outcome
-from solver.outer_loop import Monitor, StartResult
+from solver.outer_loop import StartResult
 from solver.problem import Problem
 from solver.quality import evaluate
+from solver.short_move import ROLL, Effort, Held, Moved, box
 from solver.variables import FOCUS, PER_CAMERA
 
 NEVER = NeverCancelled()
@@ -88,17 +89,17 @@ def test_rounding_breaks_nothing() -> None:
 # --- the box ----------------------------------------------------------------------------------
 
 
-def test_a_move_stays_in_its_box_and_in_the_bounds_and_the_focus_is_free() -> None:
+def test_a_move_stays_in_its_box_and_in_the_bounds_and_focus_and_roll_are_free() -> None:
     problem = problem_of(2, bounds=PoseBounds(x_mm=10.0))
     values = problem.start_values()
     bounds = unknown_bounds(problem, values)
-    low, high = (b.reshape(2, PER_CAMERA) for b in near_optimum._box(values, 0.05, bounds))
+    low, high = (b.reshape(2, PER_CAMERA) for b in box(values, 0.05, bounds))
     at = values.reshape(2, PER_CAMERA)
     np.testing.assert_allclose(high[:, 3] - at[:, 3], 10.0 / problem.length_mm)
-    for column in (0, 1, 2, 4, 5):
+    for column in (0, 1, 4, 5):
         np.testing.assert_allclose(high[:, column] - at[:, column], 0.05)
         np.testing.assert_allclose(at[:, column] - low[:, column], 0.05)
-    assert np.isinf(high[:, FOCUS]).all()
+    assert np.isinf(high[:, [ROLL, FOCUS]]).all()
     np.testing.assert_allclose(low[:, FOCUS] * problem.length_mm, 350.0)
 
 
@@ -130,30 +131,6 @@ def test_weak_are_the_points_that_losing_one_view_hurts_most() -> None:
 
 
 # --- the moves --------------------------------------------------------------------------------
-
-
-@pytest.mark.slow
-def test_a_move_that_all_but_meets_the_limits_is_finished(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    problem, _, _ = solved()
-    values, rows = problem.start_values(), [np.ones(1)]
-    asked: list[dict[str, object]] = []
-
-    def nearly(*_: object, **more: object) -> Outcome:
-        asked.append(more)
-        over = 5e-7 if len(asked) == 1 else 0.0
-        return Outcome(values, rows, 1.0, over, 3, True, False, "it moved")
-
-    monkeypatch.setattr(near_optimum, "minimise", nearly)
-    bounds = unknown_bounds(problem, values)
-    best = near_optimum._looked_at(problem, values, bounds)
-    held = near_optimum._Held(best.seen.framed, np.zeros(0, np.int64), VisibilityCuts.none())
-    monitor = Monitor(lambda *_: None, NEVER)
-    outcome, _ = near_optimum._moved(problem, best, held, 0.06, bounds, SCALE, monitor)
-    assert outcome.violation == 0.0
-    assert len(asked) == 2
-    assert asked[1]["known"] is rows
 
 
 def test_moves_end_feasible_and_better_by_the_evaluations_own_figures() -> None:
@@ -202,53 +179,54 @@ def test_a_cancelled_run_returns_its_start_and_says_so() -> None:
 
 def test_no_move_reaches_beyond_its_box(monkeypatch: pytest.MonkeyPatch) -> None:
     problem, moves = problem_of(2, coverage=Coverage()), []
-    whole = near_optimum._moved
+    whole = near_optimum.short_move
 
-    def watched(problem, best, held, half, bounds, scale, monitor):  # noqa: ANN001, ANN202
-        outcome, lost = whole(problem, best, held, half, bounds, scale, monitor)
-        moved = np.abs(outcome.values - best.values).reshape(-1, PER_CAMERA)[:, :FOCUS]
-        moves.append((half, float(moved.max())))
-        return outcome, lost
+    def watched(
+        problem: Problem, values: Floats, held: Held, effort: Effort, *more: object
+    ) -> Moved:
+        found = whole(problem, values, held, effort, *more)
+        moved = np.abs(found.outcome.values - values).reshape(-1, PER_CAMERA)
+        assert found.size == np.delete(moved, [ROLL, FOCUS], axis=1).max()
+        moves.append((effort.half, found.size))
+        return found
 
-    monkeypatch.setattr(near_optimum, "_moved", watched)
+    monkeypatch.setattr(near_optimum, "short_move", watched)
     run_near(problem, lambda *_: None, NEVER)
     assert moves[0][0] == FIRST_BOX
     for half, size in moves:
         assert size <= half + 1e-9
         assert half <= LARGEST_BOX
-    # A good move widens the next box by half; a bad one leaves two fifths of it.
-    for (before, _), (after, _) in pairwise(moves):
-        assert after == pytest.approx(min(1.5 * before, LARGEST_BOX)) or after == pytest.approx(
-            0.4 * before
+    # A good move doubles the next box; a bad one leaves two fifths of how far it went.
+    for (before, went), (after, _) in pairwise(moves):
+        assert after == pytest.approx(min(2.0 * before, LARGEST_BOX)) or after == pytest.approx(
+            0.4 * min(before, went)
         )
 
 
-def test_what_a_failed_solve_could_not_frame_is_not_held_on_to(
+def test_a_move_that_is_worse_names_the_points_that_it_worsened(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     problem, told = problem_of(), []
     start = problem.start_values()
-    bounds = unknown_bounds(problem, start)
-    begin = near_optimum._looked_at(problem, start, bounds)
-    worse = replace(
-        begin,
-        seen=replace(begin.seen, framed=np.ones_like(begin.seen.framed)),
-        merit=Merit(1.0, 0.0, 2.0 * begin.merit.cost),
-    )
+    begin = near_optimum._looked_at(problem, start, unknown_bounds(problem, start))
+    each = begin.each.copy()
+    each[[7, 31]] *= 3.0
+    each[50] *= 0.5
+    missed = replace(begin.judged, missed=np.array([12]))
+    worse = replace(begin, merit=Merit(0.0, 0.0, 2.0 * begin.merit.cost), each=each, judged=missed)
     looks = iter((begin, *[worse] * MAX_MOVES))
-    violations = iter((0.0, 1e-2, *[0.0] * MAX_MOVES))
 
-    def moved(_problem: Problem, _best: object, held: near_optimum._Held, *_: object) -> object:
-        told.append(held)
-        outcome = Outcome(start, [], 1.0, next(violations), 1, False, False, "")
-        return outcome, VisibilityCuts.none()
+    def moved(_problem: Problem, values: Floats, held: Held, effort: Effort, *_: object) -> Moved:
+        told.append((held, effort))
+        outcome = Outcome(values, [], 1.0, 0.0, 1, True, False, "")
+        return Moved(outcome, held, clean=True, edge=False, size=effort.half)
 
     monkeypatch.setattr(near_optimum, "_looked_at", lambda *_: next(looks))
-    monkeypatch.setattr(near_optimum, "_moved", moved)
-    run_near(problem, lambda *_: None, NEVER)
-    framed = [held.framed for held in told[:3]]
-    np.testing.assert_array_equal(framed[0], begin.seen.framed)
-    assert framed[1].all()
-    np.testing.assert_array_equal(framed[2], begin.seen.framed)
-    # After a failure every view is held, not only those of points that have few.
-    assert [held.views for held in told[:2]] == [2, problem.count]
+    monkeypatch.setattr(near_optimum, "short_move", moved)
+    result = run_near(problem, lambda *_: None, NEVER)
+    (first, _), (second, _) = told[:2]
+    assert np.setdiff1d(second.named, first.named).tolist() == sorted(
+        {7, 12, 31} - set(begin.weak.tolist())
+    )
+    np.testing.assert_array_equal(result.values, start)
+    assert result.why == "no move in reach improves the network any further"

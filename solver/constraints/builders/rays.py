@@ -9,6 +9,7 @@ from solver.constraints.base import Block, bound
 from solver.constraints.candidates import CandidateConstraints, grouped
 from solver.constraints.rays import FocusRays, MeanAxisIncidence, MeanImageCoordinate, RayPlanes
 from solver.problem import Problem
+from solver.variables import NetworkState
 
 _INF = np.inf
 
@@ -147,3 +148,23 @@ def ray_constraints(problem: Problem, framed: Bools) -> list[CandidateConstraint
     )
     rows += _centring(problem)
     return [r for r in rows if r.block.rows]
+
+
+def framing_violation(
+    problem: Problem, state: NetworkState, camera: Ints, points_mm: Floats
+) -> Floats:
+    """By how much points (m, 3) break frame, focus or sampling distance of their cameras, (m,).
+
+    In the solver's units, in the worst position of the head.
+    """
+    worst = np.zeros(len(camera))
+    for position in problem.framing_positions if len(camera) else ():
+        point = problem.scaled(position.points(points_mm))
+        for rows in (
+            _frame(problem, camera, point)
+            + _depths(problem, camera, point)
+            + _focus(problem, camera, point)
+        ):
+            each = rows.block.violation(state).reshape(len(camera), -1)
+            worst = np.maximum(worst, each.max(axis=1))
+    return worst
