@@ -43,10 +43,7 @@ def rows(found: Design, strip: Quality, clashes: int) -> list[str]:
     """The design, its start, and the strip."""
     count = len(found.cameras)
     solver = found.solver
-    note = (
-        f"{clashes} clashes, {solver.status.value}, KKT {solver.kkt_error:.0e}, "
-        f"{solver.seconds:.0f} s"
-    )
+    note = f"{clashes} clashes, {solver.status.value}, KKT {solver.kkt_error:.0e}"
     return [
         line("design", count, found.quality, note),
         line("start", count, found.start_quality, solver.starts[0].kind if solver.starts else ""),
