@@ -46,7 +46,9 @@ _MOST_WORSENED = 30
 
 MAX_MOVES = 12
 _STEPS, _TOLERANCE, _GAIN = 25, 1e-4, 1e-5
-_SETTLED = 1e-3
+_SETTLED = 5e-3
+"""Relative gain below which moves end: the last one, of the best network, gains the rest."""
+
 _VIOLATION, _SHORTFALL = 300.0, 3000.0
 """Weights of a violation (in length scales) and of a share of points, in units of the cost: well
 above the multipliers of limits that bind, which are of order ten."""

@@ -34,15 +34,14 @@ from solver.nlp.program import NonlinearProgram
 from solver.nlp.quadratic import stationarity
 from solver.nlp.sqp import Outcome, Watch, minimise
 from solver.problem import Problem
-from solver.variables import FOCUS, PER_CAMERA, NetworkState
+from solver.variables import FOCUS, KAPPA, PER_CAMERA, NetworkState
 
 MARGINS = Margins(0.01, 0.0)
-ROLL = 2
 _PASSES = 4
 _FIRST_GAIN = 1e-3
 """Of three steps, at which the first pass ends: rows that are added will change it anyway."""
 
-_LARGEST_RADIUS = 0.1
+_TRUSTED = 0.1
 _EDGE = 1e-9
 
 
@@ -161,7 +160,7 @@ class _Frozen:
 def box(values: Floats, half: float, bounds: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
     """Bounds (7 n,) of one move; the focus is free, and the roll, which hardly matters."""
     reach = np.full(len(values), half)
-    reach[FOCUS::PER_CAMERA] = reach[ROLL::PER_CAMERA] = np.inf
+    reach[FOCUS::PER_CAMERA] = reach[KAPPA::PER_CAMERA] = np.inf
     return np.maximum(bounds[0], values - reach), np.minimum(bounds[1], values + reach)
 
 
@@ -182,9 +181,9 @@ def short_move(
     reach = NOWHERE if whole else NEAR
     frozen = _Frozen.at(problem, values, held.named, reach, bounds, scale)
     open_mm = opening_directions(frozen.problem, frozen.state, frozen.seen.assigned)
-    found, steps, news = values, 0, True
+    found, steps, news, known = values, 0, True, None
     for k in range(_PASSES):
-        radius = min(effort.half, _LARGEST_RADIUS) * (1.0 if k == 0 else 0.3)
+        radius = min(effort.half, _TRUSTED) * (1.0 if k == 0 else 0.3)
         program = frozen.program(held, effort.half)
         outcome = minimise(
             program,
@@ -192,13 +191,15 @@ def short_move(
             lambda *step, before=steps: watch(before + step[0], *step[1:]),
             tolerance=effort.tolerance,
             gain_tolerance=effort.gain if k > 0 else max(effort.gain, _FIRST_GAIN),
+            known=known,
             max_iterations=effort.steps,
             radius=radius,
         )
         found, steps = outcome.values, steps + outcome.iterations
         held, news = frozen.learned(found, held, open_mm)
-        if outcome.stopped or (k > 0 and not news):
+        if outcome.stopped or (k > 0 and not news and outcome.converged):
             break
+        known = None if news else outcome.multipliers
     edge, size = _extent(frozen, found, program.bounds)
     return Moved(replace(outcome, iterations=steps), held, not news, edge, size)
 
@@ -217,5 +218,5 @@ def _extent(frozen: _Frozen, values: Floats, bounds: tuple[Floats, Floats]) -> t
     near |= (values >= bounds[1] - _EDGE) & (bounds[1] < frozen.bounds[1])
     free = frozen.problem.unknowns.free
     table = np.abs(values - frozen.values).reshape(-1, PER_CAMERA)
-    counts = [k for k in range(PER_CAMERA) if k not in (ROLL, FOCUS)]
+    counts = [k for k in range(PER_CAMERA) if k not in (KAPPA, FOCUS)]
     return bool(near[free].any()), float(table[:, counts].max(initial=0.0))

@@ -19,7 +19,7 @@ from geometry.frames import PHOTO_TO_CV, Pose
 PER_CAMERA = 7
 ANGLES = slice(0, 3)
 POSITION = slice(3, 6)
-FOCUS = 6
+KAPPA, FOCUS = 2, 6
 
 
 def _elementary(angles: Floats, axis: int) -> tuple[Floats, Floats, Floats]:

@@ -6,6 +6,7 @@ import base64
 import gzip
 import json
 from collections.abc import Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
 from functools import cache
 from importlib.resources import files
 from string import Template
@@ -55,7 +56,7 @@ def drawn_page(
     body = (
         f"<noscript><style>{_STILLED}</style></noscript>\n"
         f"<header>{header}</header>\n<main>{main}</main>\n<footer>{footer}</footer>\n"
-        f'<script type="text/plain" id="plotly">{_plotly()}</script>\n'
+        f'<script type="text/plain" id="plotly">{_plotly().result()}</script>\n'
         f'<script type="text/plain" id="packed">{packed(figures)}</script>\n'
         f"<script>{Template(_part('drawn.js')).substitute(script=script)}</script>"
     )
@@ -63,12 +64,21 @@ def drawn_page(
     return _filled(title, body, style, DRAWN_POLICY, f' data-view="{shown}"')
 
 
+def pack_ahead() -> None:
+    """Have plotly packed in a thread, for :func:`drawn_page`, while the figures are made."""
+    _plotly()
+
+
 @cache
-def _plotly() -> str:
+def _plotly() -> Future[str]:
     # Imported here: plotly costs a second, and only a page with figures needs it.
     from plotly.offline import get_plotlyjs
 
-    return packed(get_plotlyjs())
+    program = get_plotlyjs()
+    aside = ThreadPoolExecutor(1, thread_name_prefix="packing")
+    packing = aside.submit(packed, program)
+    aside.shutdown(wait=False)
+    return packing
 
 
 def packed(text: str) -> str:

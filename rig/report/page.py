@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
 from common.files.plain import number
-from common.page.document import drawn_page, style_sheet
+from common.page.document import drawn_page, pack_ahead, style_sheet
 from common.page.still import still_picture
 from geometry.scan import ScanNote
 from geometry.subject import Subject
@@ -33,6 +34,8 @@ if TYPE_CHECKING:
 
 SMALL_HEAD_FACES = 6_000
 _SCENES = ("rig-3d", "ellipsoids-before", "ellipsoids-after")
+_DRAWERS = 2
+"""Threads that draw still pictures: half of the work is the image library's, beside Python."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +63,7 @@ def render_report(
     ``title`` and ``scan_name`` may hold anything: they are escaped. ``document.body.dataset``
     gets ``view``, a JSON summary of what is drawn, and ``ready`` once the figures stand.
     """
+    pack_ahead()
     figures = _figures(design, subject, layout)
     return drawn_page(
         title,
@@ -82,7 +86,9 @@ def _main(
     scan_name: str,
 ) -> str:
     """All sections in their order."""
-    stills = {key: still_picture(plot) for key, plot in figures.plots.items() if key in _SCENES}
+    with ThreadPoolExecutor(_DRAWERS, thread_name_prefix="still") as drawers:
+        drawn = drawers.map(still_picture, [figures.plots[key] for key in _SCENES])
+        stills = dict(zip(_SCENES, drawn, strict=True))
     parts = (
         summary.verdict(design, layout),
         summary.tiles(design, layout),

@@ -24,8 +24,8 @@ from solver.nlp.sqp import Outcome
 from solver.outer_loop import StartResult
 from solver.problem import Problem
 from solver.quality import evaluate
-from solver.short_move import ROLL, Effort, Held, Moved, box
-from solver.variables import FOCUS, PER_CAMERA
+from solver.short_move import Effort, Held, Moved, box
+from solver.variables import FOCUS, KAPPA, PER_CAMERA
 
 NEVER = NeverCancelled()
 SCALE = 2.0
@@ -99,7 +99,7 @@ def test_a_move_stays_in_its_box_and_in_the_bounds_and_focus_and_roll_are_free()
     for column in (0, 1, 4, 5):
         np.testing.assert_allclose(high[:, column] - at[:, column], 0.05)
         np.testing.assert_allclose(at[:, column] - low[:, column], 0.05)
-    assert np.isinf(high[:, [ROLL, FOCUS]]).all()
+    assert np.isinf(high[:, [KAPPA, FOCUS]]).all()
     np.testing.assert_allclose(low[:, FOCUS] * problem.length_mm, 350.0)
 
 
@@ -186,7 +186,7 @@ def test_no_move_reaches_beyond_its_box(monkeypatch: pytest.MonkeyPatch) -> None
     ) -> Moved:
         found = whole(problem, values, held, effort, *more)
         moved = np.abs(found.outcome.values - values).reshape(-1, PER_CAMERA)
-        assert found.size == np.delete(moved, [ROLL, FOCUS], axis=1).max()
+        assert found.size == np.delete(moved, [KAPPA, FOCUS], axis=1).max()
         moves.append((effort.half, found.size))
         return found
 
