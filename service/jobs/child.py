@@ -27,7 +27,10 @@ from service.kinds.base import Result
 FindWork = Callable[[str], Work[Any, Any]]
 """The work of a kind of job by its name: imports what it needs only then."""
 
+_STEP_BACK = 10
 _PROGRESS_INTERVAL_S = 0.2
+_LOADING = Progress("loading the program", 0.0)
+"""Told before the imports of a kind of work, which take seconds."""
 
 
 class _Reporter:
@@ -54,7 +57,7 @@ def main(find: FindWork) -> int:
     message = TaskMessage(sys.stdin.buffer.readline())
     cancel = threading.Event()
     threading.Thread(target=_obey, args=(cancel,), daemon=True).start()
-    os.nice(5)  # The service must go on answering while all cores are busy.
+    os.nice(_STEP_BACK)  # The service must go on answering while all cores are busy.
     limit = message.memory_limit_bytes
     if limit is not None:
         resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
@@ -78,6 +81,7 @@ def _obey(cancel: threading.Event) -> None:
 
 def _outcome(find: FindWork, message: TaskMessage, running: Running) -> Result | RigwrightError:
     try:
+        running.report(_LOADING)
         work = find(message.kind_name)
         if running.cancel.is_set():
             raise CancelledError

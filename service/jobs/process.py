@@ -101,7 +101,9 @@ def _process(
         stdout=subprocess.PIPE,
         stderr=log_file,
         env=os.environ | ONE_BLAS_THREAD,
-        start_new_session=True,
+        # Not a session of its own: where Linux shares cores out among sessions first, a task's
+        # niceness would weigh nothing against the service's.
+        process_group=0,
     )
     try:
         with suppress(BrokenPipeError):

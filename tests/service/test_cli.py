@@ -206,8 +206,11 @@ def test_progress_is_plain_lines_without_a_terminal(
     done = run_task(COUNT, CountRequest(to=3), {}, tmp_path, engine=engine)
     assert done.counted == 3
     lines = capsys.readouterr().err.splitlines()
-    assert lines[0] == "  0 % counting: start 1, iteration 0, cost -, violation -"
-    assert len(lines) == 3
+    assert lines[:2] == [
+        "  0 % loading the program",
+        "  0 % counting: start 1, iteration 0, cost -, violation -",
+    ]
+    assert len(lines) == 4
 
 
 # A command of its own that counts: what every command does on the way, but for as long as needed.
@@ -234,6 +237,7 @@ def test_interrupting_leaves_nothing(tmp_path: Path, number: signal.Signals) -> 
         [sys.executable, "-c", COUNTING, str(out)], stderr=subprocess.PIPE, text=True
     )
     assert process.stderr is not None
+    assert "loading" in process.stderr.readline()
     assert "counting" in process.stderr.readline()
     began = time.monotonic()
     process.send_signal(number)
@@ -249,6 +253,7 @@ def test_a_killed_command_leaves_no_process(tmp_path: Path) -> None:
         [sys.executable, "-c", COUNTING, str(tmp_path / "out")], stderr=subprocess.PIPE, text=True
     )
     assert process.stderr is not None
+    assert "loading" in process.stderr.readline()
     assert "counting" in process.stderr.readline()
     children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
     assert len(children) == 1

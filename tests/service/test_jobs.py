@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+import os
 import subprocess
 import sys
 import threading
@@ -10,7 +11,7 @@ from pathlib import Path
 
 import counting_job
 import pytest
-from counting_job import BRIEFLY, COUNT, MISBEHAVE, CountRequest, Misbehaved, MisbehaveRequest
+from counting_job import BRIEFLY, COUNT, MISBEHAVE, Counted, CountRequest, Misbehaved, MisbehaveRequest
 from service_helpers import HERE, ROOT, alive, ended, files_under, wait_for
 from sqlalchemy.exc import OperationalError
 
@@ -46,14 +47,30 @@ class TestProcessEngine:
         heard: list[Progress] = []
         task = Task(COUNT, CountRequest(to=5), tmp_path)
         assert ENGINE.run(task, heard.append, NeverCancelled()).counted == 5
-        assert [progress.start for progress in heard] == [0, 1, 2, 3, 4]
-        assert math.isnan(heard[0].cost)  # NaN has no form in JSON, and comes back
+        assert [progress.start for progress in heard] == [-1, 0, 1, 2, 3, 4]
+        assert math.isnan(heard[1].cost)  # NaN has no form in JSON, and comes back
         assert (tmp_path / "numbers.txt").read_text().split() == ["0", "1", "2", "3", "4"]
 
     def test_numerical_libraries_get_one_thread(self, tmp_path: Path) -> None:
         threads = misbehave(tmp_path, "threads").threads
         assert threads
         assert set(threads) == {1}
+
+    def test_it_is_heard_of_before_its_work_is_loaded(self, tmp_path: Path) -> None:
+        heard: list[str] = []
+        kind = JobKind("nothing", CountRequest, Counted)  # which there is nothing to load for
+        with pytest.raises(InternalError, match="no work"):
+            ENGINE.run(
+                Task(kind, CountRequest(to=1), tmp_path),
+                lambda told: heard.append(told.stage),
+                NeverCancelled(),
+            )
+        assert heard == ["loading the program"]
+
+    def test_it_steps_back_for_the_service(self, tmp_path: Path) -> None:
+        """Where Linux shares cores out among sessions first, niceness counts within one only."""
+        nice = min(os.nice(0) + 10, 19)
+        assert misbehave(tmp_path, "rank").rank == (nice, os.getsid(0))
 
     def test_errors_cross_whole(self, tmp_path: Path) -> None:
         with pytest.raises(InputError) as caught:
@@ -131,7 +148,7 @@ class TestProcessEngine:
         (tmp_path / mark).mkdir()
         parent = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True)
         assert parent.stdout is not None
-        assert parent.stdout.readline().strip() == "0"
+        assert parent.stdout.readline().strip() == "-1"  # before its work is loaded
         children = Path(f"/proc/{parent.pid}/task/{parent.pid}/children").read_text().split()
         assert len(children) == 1
         parent.kill()

@@ -141,10 +141,10 @@ class TestEvents:
     def test_every_event_in_order_and_a_clear_end(self, client: TestClient) -> None:
         events = follow(client, count(client, 5, step_s=0.05))
         assert [event["event"] for event in events] == [
-            "pending", "running", *["progress"] * 5, "completed"
+            "pending", "running", *["progress"] * 6, "completed"
         ]  # fmt: skip
-        assert [int(event["id"]) for event in events] == list(range(1, 9))
-        assert [event["data"]["start"] for event in events[2:7]] == [0, 1, 2, 3, 4]
+        assert [int(event["id"]) for event in events] == list(range(1, 10))
+        assert [event["data"]["start"] for event in events[2:8]] == [-1, 0, 1, 2, 3, 4]
         assert events[-1]["data"]["result"]["counted"] == 5
 
     def test_a_stream_goes_on_where_it_was_left(self, client: TestClient) -> None:

@@ -41,6 +41,7 @@ class Misbehaved(Result):
     how: str = ""
     eaten: int = 0
     threads: tuple[int, ...] = ()
+    rank: tuple[int, int] | None = None
 
 
 COUNT = JobKind("count", CountRequest, Counted)
@@ -87,6 +88,8 @@ def misbehave(task: Task[MisbehaveRequest, Misbehaved], running: Running) -> Mis
         subprocess.Popen(
             [sys.executable, "-c", f"import time; time.sleep(600) # {task.request.mark}"]
         )
+    if how == "rank":
+        return Misbehaved(rank=(os.nice(0), os.getsid(0)))
     if how == "threads":
         import numpy  # noqa: F401
         from threadpoolctl import threadpool_info
