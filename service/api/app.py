@@ -70,6 +70,8 @@ def make_app() -> FastAPI:
         lifespan=_lifespan,
         docs_url=None,
         redoc_url=None,
+        # Its route would make the document in the event loop, where everybody waits for it.
+        openapi_url=None,
         # A redirect would name the host that was asked for.
         redirect_slashes=False,
         generate_unique_id_function=lambda route: route.name,

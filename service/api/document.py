@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import json
+import threading
 from collections.abc import Iterator, Mapping
+from functools import lru_cache
 from typing import Any
 
 from fastapi import FastAPI
@@ -55,6 +58,23 @@ class JobEventData(Model):
     cost: float | None = None
     violation: float | None = None
     problem: Problem | None = None
+
+
+_making = threading.Lock()
+
+
+def openapi_text(app: FastAPI, prefix: str) -> bytes:
+    """The document as it is sent, made once for all; ``prefix`` is what a proxy puts first."""
+    with _making:
+        return _text(app, prefix)
+
+
+@lru_cache(maxsize=4)
+def _text(app: FastAPI, prefix: str) -> bytes:
+    schema = app.openapi()
+    if prefix:
+        schema = {**schema, "servers": [{"url": prefix}]}
+    return json.dumps(schema, ensure_ascii=False, separators=(",", ":")).encode()
 
 
 def openapi(app: FastAPI) -> Json:

@@ -1,12 +1,14 @@
-"""``/v1/rig-examples``: rigs to begin a design with."""
+"""``/v1/rig-examples`` and ``/v1/rig-schema``: rigs to begin with, and what a rig may say."""
 
 from __future__ import annotations
+
+from typing import Any
 
 from fastapi import APIRouter
 
 from service.kinds.base import Model
 from service.kinds.design import RigExample
-from service.tasks.examples import example_rigs
+from service.tasks.examples import example_rigs, rig_schema
 
 router = APIRouter(tags=["designs"])
 
@@ -21,3 +23,9 @@ class RigExampleList(Model):
 def list_rig_examples() -> RigExampleList:
     """List rigs to begin with: change what differs, and send it with a design."""
     return RigExampleList(items=list(example_rigs()))
+
+
+@router.get("/v1/rig-schema")
+def read_rig_schema() -> dict[str, Any]:
+    """Read what a rig may say: the JSON schema (draft 2020-12) of a rig file."""
+    return rig_schema()

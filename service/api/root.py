@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Literal
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Request, Response
 
 from common.version import program_version
+from service.api import document
 from service.api.addresses import at
 from service.api.context import ServiceDep
 from service.kinds.base import Model
@@ -14,7 +15,7 @@ from service.kinds.base import Model
 router = APIRouter(tags=["service"])
 
 _RESOURCES = (
-    *("health", "ready", "scans", "rig-examples", "designs", "studies"),
+    *("health", "ready", "scans", "rig-examples", "rig-schema", "designs", "studies"),
     *("plans", "evaluations"),
     *("rigs", "captures", "rig-tests", "sessions", "removed-sessions"),
     *(
@@ -48,3 +49,10 @@ def read_service(service: ServiceDep) -> ServiceDocument:
         version=program_version(),
         links=links | {"metrics": at("/metrics"), "openapi": at("/openapi.json")},
     )
+
+
+@router.get("/openapi.json", name="openapi", include_in_schema=False)
+def read_openapi(request: Request) -> Response:
+    """Read the document of all paths."""
+    text = document.openapi_text(request.app, request.scope.get("root_path", "").rstrip("/"))
+    return Response(text, media_type="application/json")

@@ -1,12 +1,13 @@
-"""Rigs to begin with: the rig files that come with the program."""
+"""Rigs to begin with: the rig files that come with the program, and what one may say."""
 
 from __future__ import annotations
 
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 from rig.specification.examples import example_names, example_text
-from rig.specification.rigfile import parse_rig_file
+from rig.specification.rigfile import RigFile, parse_rig_file
 from service.kinds.design import RigExample
 
 
@@ -14,6 +15,12 @@ from service.kinds.design import RigExample
 def example_rigs() -> tuple[RigExample, ...]:
     """All of them; only what the files say themselves is set."""
     return tuple(_example(name) for name in example_names())
+
+
+@cache
+def rig_schema() -> dict[str, Any]:
+    """The JSON schema (draft 2020-12) of a rig file."""
+    return RigFile.model_json_schema()
 
 
 def rig_of_file(path: Path, name: str) -> RigExample:

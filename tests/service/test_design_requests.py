@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import tomllib
 
+import jsonschema
 import pytest
 from pydantic import ValidationError
+from starlette.testclient import TestClient
 
 from rig.specification.examples import example_text
+from rig.specification.rigfile import RigFile
 from rig.specification.strategies import Strategy
+from service.api.app import make_app
 from service.kinds.design import DesignRequest
 
 RIG = tomllib.loads(example_text("face"))
@@ -27,3 +31,12 @@ def test_what_is_asked_for_comes_before_what_the_rig_says() -> None:
 def test_a_strategy_that_nobody_knows_is_refused() -> None:
     with pytest.raises(ValidationError, match="exchange"):
         DesignRequest.model_validate({"rig": RIG, "strategy": "luck"})
+
+
+def test_what_a_rig_may_say_is_read_from_the_service() -> None:
+    client = TestClient(make_app())
+    schema = client.get("/v1/rig-schema").json()
+    jsonschema.validate(RIG, schema)
+    with pytest.raises(jsonschema.ValidationError, match="cameras"):
+        jsonschema.validate(RIG | {"cameras": "many"}, schema)
+    assert schema == RigFile.model_json_schema()

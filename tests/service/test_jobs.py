@@ -11,7 +11,15 @@ from pathlib import Path
 
 import counting_job
 import pytest
-from counting_job import BRIEFLY, COUNT, MISBEHAVE, Counted, CountRequest, Misbehaved, MisbehaveRequest
+from counting_job import (
+    BRIEFLY,
+    COUNT,
+    MISBEHAVE,
+    Counted,
+    CountRequest,
+    Misbehaved,
+    MisbehaveRequest,
+)
 from service_helpers import HERE, ROOT, alive, ended, files_under, wait_for
 from sqlalchemy.exc import OperationalError
 

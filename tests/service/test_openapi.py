@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import os
 import re
@@ -74,6 +75,22 @@ def test_the_committed_document_is_that_of_the_code() -> None:
     assert committed == document(), (
         "write it again: python -m service.reference.openapi docs/reference/openapi.json"
     )
+
+
+def test_only_what_waits_for_others_is_answered_in_the_event_loop() -> None:
+    """What computes there holds up everybody: this document took seconds to make."""
+    app = make_app()
+    routes = [route for router in (app.router, *app.state.routers) for route in router.routes]
+    ours = [(getattr(r, "name", ""), getattr(r, "endpoint", None)) for r in routes]
+    waiting = {
+        name
+        for name, endpoint in ours
+        if inspect.iscoroutinefunction(endpoint) or inspect.isasyncgenfunction(endpoint)
+    }
+    assert len(ours) > 100
+    assert {name for name in waiting if not name.startswith("follow_")} == {
+        "add_scan", "add_picture_set"
+    }  # fmt: skip
 
 
 def operations() -> list[tuple[str, str, dict[str, Any]]]:

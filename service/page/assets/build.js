@@ -1,9 +1,9 @@
 // Mount plans: how the cameras of a design are held.
 
-import { get, post } from "./api.js";
+import { all, get, post } from "./api.js";
 import { choice, field, figures, fill, frame, h, number, percent, problem, table } from "./dom.js";
 import { watch } from "./job.js";
-import { completed, files, jobs } from "./joblist.js";
+import { completed, files, links } from "./joblist.js";
 
 const KINDS = [["t-slot", "Frame of t-slot profiles"], ["plate", "Plate with posts"], ["arc", "Arc"], ["tripods", "Tripods"]];
 
@@ -14,7 +14,8 @@ export async function build(root, [id, wanted], signal) {
 }
 
 async function form(root, wanted, signal) {
-  const designs = await completed("/v1/designs", (job) => `${job.result.name || "Design"}, ${job.result.cameras} cameras`, signal);
+  const [made, plans] = await Promise.all([all("/v1/designs", signal), all("/v1/plans", signal)]);
+  const designs = completed(made, (job) => `${job.result.name || "Design"}, ${job.result.cameras} cameras`);
   const which = choice(designs, wanted ?? designs[0]?.[0]);
   const kind = choice(KINDS, "t-slot");
   const said = h("div", {});
@@ -31,7 +32,7 @@ async function form(root, wanted, signal) {
     designs.length ? h("form", { class: "card configure", onsubmit: go }, h("div", { class: "fields" }, field("Design", which), field("Built of", kind)),
       h("button", { type: "submit", class: "main" }, "Plan it"), said)
       : h("p", {}, "There is no finished design yet. ", h("a", { href: "#/design" }, "Make one"), "."),
-    h("h2", {}, "Plans"), await jobs("/v1/plans", "build", (job) => (job.result ? `${job.result.name || "Plan"}, ${job.result.system}` : "Plan"), signal));
+    h("h2", {}, "Plans"), links(plans, "build", (job) => (job.result ? `${job.result.name || "Plan"}, ${job.result.system}` : "Plan")));
 }
 
 async function one(root, id, signal) {

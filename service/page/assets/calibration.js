@@ -4,7 +4,7 @@ import { all, get, post } from "./api.js";
 import { choice, field, figures, fill, frame, h, number, percent, problem, table } from "./dom.js";
 import { asking } from "./asking.js";
 import { watch } from "./job.js";
-import { completed, files, jobs } from "./joblist.js";
+import { completed, files, links } from "./joblist.js";
 
 /** All of it, or one calibration (`calibration`), check (`check`) or target set (`targets`). */
 export async function calibration(root, [what, id], signal) {
@@ -20,16 +20,21 @@ export async function calibration(root, [what, id], signal) {
 }
 
 async function overview(root, signal) {
-  const [targets, sets, sessions, designs, known] = await Promise.all([
+  const [targets, sets, sessions, designed, calibrations, checks] = await Promise.all([
     all("/v1/target-sets", signal), all("/v1/picture-sets", signal), get("/v1/sessions", signal),
-    completed("/v1/designs", (job) => `${job.result.name || "Design"}, ${job.result.cameras} cameras`, signal),
-    completed("/v1/calibrations", (job) => `${job.result.cameras.length} cameras, ${number(job.result.rms_px)} px`, signal)]);
+    all("/v1/designs", signal), all("/v1/calibrations", signal), all("/v1/checks", signal)]);
+  const designs = completed(designed, (job) => `${job.result.name || "Design"}, ${job.result.cameras} cameras`);
+  const known = completed(calibrations, fit);
   const pictures = [...sessions.items.map(({ name }) => [`s${name}`, `Session ${name}`]), ...sets.map((set) => [`p${set.id}`, `Pictures ${set.filename ?? set.id}`])];
   fill(root, h("h1", {}, "Calibration and check"),
     h("div", { class: "split" }, checkForm(known, pictures), calibrateForm(targets, pictures, designs)),
     h("section", { class: "card" }, h("h2", {}, "Targets to print"), targetsForm(designs), h("ul", { class: "list" }, targets.map((set) => sheets(set, signal)))),
-    h("h2", {}, "Checks"), await jobs("/v1/checks", "calibration/checks", (job) => (job.result ? `${job.result.light}: ${job.result.text.slice(0, 90)}` : "Check"), signal),
-    h("h2", {}, "Calibrations"), await jobs("/v1/calibrations", "calibration/calibrations", (job) => (job.result ? `${job.result.cameras.length} cameras, ${number(job.result.rms_px)} px` : "Calibration"), signal));
+    h("h2", {}, "Checks"), links(checks, "calibration/checks", (job) => (job.result ? `${job.result.light}: ${job.result.text.slice(0, 90)}` : "Check")),
+    h("h2", {}, "Calibrations"), links(calibrations, "calibration/calibrations", (job) => (job.result ? fit(job) : "Calibration")));
+}
+
+function fit(job) {
+  return `${job.result.cameras.length} cameras, ${number(job.result.rms_px)} px`;
 }
 
 function source(value) {

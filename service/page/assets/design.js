@@ -3,7 +3,7 @@
 import { all, get, post, upload } from "./api.js";
 import { choice, field, figures, fill, frame, h, number, percent, problem, table } from "./dom.js";
 import { watch } from "./job.js";
-import { files, jobs } from "./joblist.js";
+import { files, links } from "./joblist.js";
 import { rigForm } from "./rigform.js";
 
 /** The form with the designs there are, or one of them. */
@@ -15,7 +15,8 @@ export async function design(root, [id], signal) {
 const AXES = ["auto", "+x", "-x", "+y", "-y", "+z", "-z"].map((axis) => [axis, axis === "auto" ? "found by itself" : axis]);
 
 async function form(root, signal) {
-  const [scans, rigs, schema] = await Promise.all([all("/v1/scans", signal), get("/v1/rig-examples", signal), get("/openapi.json", signal)]);
+  const [scans, rigs, schema, made] = await Promise.all([
+    all("/v1/scans", signal), get("/v1/rig-examples", signal), get("/v1/rig-schema", signal), all("/v1/designs", signal)]);
   const scan = scanChoice(scans);
   const count = h("input", { type: "number", min: 1, max: 500, value: rigs.items[0].rig.cameras ?? 7, required: true });
   let limits = rigForm(rigs.items[0].rig, schema);
@@ -50,7 +51,7 @@ async function form(root, signal) {
         h("div", { class: "fields" }, field("Cameras", count, "How many to place."), field("Begin with", example)), place),
       h("section", { class: "card" }, h("h2", {}, "3. Start"), start, said)),
     h("h2", {}, "Designs"),
-    await jobs("/v1/designs", "design", (job) => (job.result ? `${job.result.name || "Design"}, ${job.result.cameras} cameras, sigma ${microns(job.result.sigma_median_mm)}` : "Design"), signal));
+    links(made, "design", (job) => (job.result ? `${job.result.name || "Design"}, ${job.result.cameras} cameras, sigma ${microns(job.result.sigma_median_mm)}` : "Design")));
 }
 
 /** A place to drop a scan, and the scans that are here. */

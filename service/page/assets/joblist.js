@@ -1,22 +1,20 @@
 // Lists of jobs, and files that a job made.
 
-import { all, get } from "./api.js";
+import { get } from "./api.js";
 import { h, when } from "./dom.js";
 
 const STATES = { completed: "good", failed: "bad", interrupted: "bad", cancelled: "warn", pending: "warn", running: "warn" };
 
-/** Jobs of a kind, newest first, as links into a view. */
-export async function jobs(path, view, words, signal) {
-  const items = await all(path, signal);
-  return h("ul", { class: "list" }, items.map((job) => h("li", {},
+/** Jobs, newest first, as links into a view. */
+export function links(jobs, view, words) {
+  return h("ul", { class: "list" }, jobs.map((job) => h("li", {},
     h("a", { href: `#/${view}/${encodeURIComponent(job.id)}` }, words(job)), " ",
     h("span", { class: `state ${STATES[job.status]}` }, job.status), " ", h("small", {}, when(job.created_at)))));
 }
 
 /** The jobs that were completed, as pairs for a choice. */
-export async function completed(path, words, signal) {
-  const items = await all(path, signal);
-  return items.filter((job) => job.status === "completed").map((job) => [job.id, `${words(job)}, ${when(job.created_at)}`]);
+export function completed(jobs, words) {
+  return jobs.filter((job) => job.status === "completed").map((job) => [job.id, `${words(job)}, ${when(job.created_at)}`]);
 }
 
 /** Links to all files of a job. */

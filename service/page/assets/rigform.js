@@ -1,17 +1,15 @@
-// A rig file as a form: fields with units and help, drawn from an example and the service's schema.
+// A rig file as a form: fields with units and help, drawn from an example and the schema of rigs.
 
 import { fill, h } from "./dom.js";
 
 const UNITS = [["_mm2", "mm²"], ["_mm", "mm"], ["_um", "µm"], ["_px", "px"], ["_deg", "°"], ["_us", "µs"], ["_s", "s"], ["_kg", "kg"], ["_g", "g"]];
 const HIDDEN = ["schema", "name", "cameras"];
 
-/** A form for `rig`; `schema` is the service's OpenAPI document. `read()` gives the rig as it was filled in. */
+/** A form for `rig`; `schema` is what a rig may say. `read()` gives the rig as it was filled in. */
 export function rigForm(rig, schema) {
   const now = structuredClone(rig);
-  const shapes = schema.components.schemas;
-  const top = shapes.DesignBody ?? {};
   const element = h("div", { class: "rigform" });
-  fill(element, groups(now, resolve(top.properties?.rig, shapes), shapes));
+  fill(element, groups(now, schema, schema.$defs));
   return { element, read: () => structuredClone(now) };
 }
 

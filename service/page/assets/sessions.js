@@ -11,7 +11,7 @@ export async function sessions(root, [name], signal) {
 }
 
 async function list(root, signal) {
-  const { items } = await get("/v1/sessions", signal);
+  const [{ items }, gone] = await Promise.all([get("/v1/sessions", signal), get("/v1/removed-sessions", signal)]);
   const rows = h("div", {});
   const show = (words) => {
     const found = items.filter((item) => item.name.toLowerCase().includes(words.toLowerCase()));
@@ -19,13 +19,12 @@ async function list(root, signal) {
       : h("p", {}, items.length ? "No session has such a name." : "Nothing was captured yet. Take a capture under Rig."));
   };
   fill(root, h("h1", {}, "Sessions"),
-    items.length > 5 ? h("input", { type: "search", placeholder: "Search", "aria-label": "Search sessions", oninput: (event) => show(event.target.value) }) : null, rows, await deleted(root, signal));
+    items.length > 5 ? h("input", { type: "search", placeholder: "Search", "aria-label": "Search sessions", oninput: (event) => show(event.target.value) }) : null, rows, deleted(root, gone.items, signal));
   show("");
 }
 
 /** What was deleted and can still be restored. */
-async function deleted(root, signal) {
-  const { items } = await get("/v1/removed-sessions", signal);
+function deleted(root, items, signal) {
   if (!items.length) return null;
   const told = h("div", { "aria-live": "polite" });
   const act = async (work) => {

@@ -3,7 +3,7 @@
 import { all, get, post } from "./api.js";
 import { choice, field, figures, fill, frame, h, number, problem } from "./dom.js";
 import { watch } from "./job.js";
-import { files, jobs } from "./joblist.js";
+import { files, links } from "./joblist.js";
 import { rigForm } from "./rigform.js";
 import { fromFiles } from "./studyfile.js";
 
@@ -16,7 +16,8 @@ export async function studies(root, [id], signal) {
 }
 
 async function form(root, signal) {
-  const [scans, rigs, schema] = await Promise.all([all("/v1/scans", signal), get("/v1/rig-examples", signal), get("/openapi.json", signal)]);
+  const [scans, rigs, schema, made] = await Promise.all([
+    all("/v1/scans", signal), get("/v1/rig-examples", signal), get("/v1/rig-schema", signal), all("/v1/studies", signal)]);
   const name = h("input", { maxlength: 100, value: "How many cameras?" });
   const heads = scans.map((scan, k) => h("input", { type: "checkbox", value: scan.id, checked: k === 0 }));
   const cameras = list("5, 6, 7");
@@ -55,7 +56,7 @@ async function form(root, signal) {
       place, start, said, fromFiles(scans, chosen, begin))
       : h("p", {}, "There is no scan yet. ", h("a", { href: "#/design" }, "Give one under Design"), "."),
     h("h2", {}, "Studies there are"),
-    await jobs("/v1/studies", "studies", (job) => (job.result ? `${job.result.name}, ${job.result.designs} designs` : "Study"), signal));
+    links(made, "studies", (job) => (job.result ? `${job.result.name}, ${job.result.designs} designs` : "Study")));
 }
 
 async function begin(asked) {

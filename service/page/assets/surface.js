@@ -4,7 +4,7 @@ import { all, get, post } from "./api.js";
 import { choice, field, figures, fill, frame, h, number, percent, table } from "./dom.js";
 import { asking } from "./asking.js";
 import { watch } from "./job.js";
-import { completed, files, jobs } from "./joblist.js";
+import { completed, files, links } from "./joblist.js";
 
 /** All of it, one reconstruction (`reconstructions`) or one comparison (`comparisons`). */
 export async function surface(root, [what, id], signal) {
@@ -19,16 +19,18 @@ export async function surface(root, [what, id], signal) {
 }
 
 async function overview(root, signal) {
-  const [sessions, calibrations, designs, surfaces, scans] = await Promise.all([
+  const [sessions, calibrated, designed, made, scans, comparisons] = await Promise.all([
     get("/v1/sessions", signal),
-    completed("/v1/calibrations", (job) => `Calibration of ${job.result.cameras.length} cameras`, signal),
-    completed("/v1/designs", (job) => `${job.result.name || "Design"}, as designed`, signal),
-    completed("/v1/reconstructions", named, signal), all("/v1/scans", signal)]);
+    all("/v1/calibrations", signal), all("/v1/designs", signal), all("/v1/reconstructions", signal),
+    all("/v1/scans", signal), all("/v1/comparisons", signal)]);
+  const calibrations = completed(calibrated, (job) => `Calibration of ${job.result.cameras.length} cameras`);
+  const designs = completed(designed, (job) => `${job.result.name || "Design"}, as designed`);
+  const surfaces = completed(made, named);
   const cameras = [...calibrations.map(([id, words]) => [`c${id}`, words]), ...designs.map(([id, words]) => [`d${id}`, words])];
   fill(root, h("h1", {}, "Surfaces"),
     h("div", { class: "split" }, reconstructForm(sessions.items, cameras, signal), compareForm(surfaces, scans)),
-    h("h2", {}, "Reconstructions"), await jobs("/v1/reconstructions", "surface/reconstructions", (job) => (job.result ? named(job) : "Reconstruction"), signal),
-    h("h2", {}, "Comparisons"), await jobs("/v1/comparisons", "surface/comparisons", (job) => (job.result ? `median ${number(job.result.median_absolute_mm, "mm")}` : "Comparison"), signal));
+    h("h2", {}, "Reconstructions"), links(made, "surface/reconstructions", (job) => (job.result ? named(job) : "Reconstruction")),
+    h("h2", {}, "Comparisons"), links(comparisons, "surface/comparisons", (job) => (job.result ? `median ${number(job.result.median_absolute_mm, "mm")}` : "Comparison")));
 }
 
 function named(job) {
