@@ -32,6 +32,10 @@ _FEWEST_EDGES = 12
 _SHARP_QUARTILE = 25.0
 """Of all edges the sharper ones count: others lie outside the depth of field, or are shadows."""
 
+SHARP_PX = 1.5
+"""Blur at which detail of eight pixels keeps half its contrast, exp(-2 (pi blur / 8)^2): less than
+matching lives on. Two pixels of defocus, as designs allow, are half a pixel of blur."""
+
 WHITE = 0.98
 MOST_WHITE = 0.005
 DARK = {8: 0.25, 16: 0.05}
@@ -59,6 +63,11 @@ class Look:
     white: float
     level: float
     dark: bool
+
+    @property
+    def sharp(self) -> bool | None:
+        """Whether it is sharp; None where it shows no edges to tell by."""
+        return None if self.blur_px is None else self.blur_px <= SHARP_PX
 
     @property
     def warnings(self) -> tuple[str, ...]:

@@ -22,6 +22,7 @@ from service.api import (
     exports,
     health,
     liveviews,
+    marks,
     metrics,
     picturesets,
     plans,
@@ -79,7 +80,7 @@ def make_app() -> FastAPI:
     resources = (
         *(root, signin, health, metrics, scans, examples, designs, exports, studies, studyfiles),
         *(plans, evaluations),
-        *(rigs, liveviews, captures, rigtests, sessions, removed),
+        *(rigs, liveviews, captures, rigtests, sessions, marks, removed),
         *(targetsets, picturesets, calibrations, checks, acceptances),
         *(reconstructions, comparisons),
     )

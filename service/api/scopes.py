@@ -26,6 +26,7 @@ _CONFIGURES = (
     *("add_calibration", "remove_calibration", "add_check", "remove_check"),
     *("add_acceptance", "remove_acceptance", "remove_capture", "remove_rig_test"),
     *("remove_session", "restore_session", "erase_session"),
+    *("reject_pictures", "accept_pictures"),
     *("add_reconstruction", "remove_reconstruction", "add_comparison", "remove_comparison"),
 )
 _FIRES = ("add_capture", "add_rig_test", "reset_rig")

@@ -69,6 +69,8 @@ def body_examples() -> Mapping[str, Any]:
         },
         "add_capture": {"capture_id": "anna-001", "session": "anna"},
         "add_rig_test": {"test": "self-test"},
+        "reject_pictures": {"camera": "cam03", "shot": 1, "why": "blinked"},
+        "accept_pictures": {"camera": "cam03", "shot": 1},
         "sign_in": {"key": "rw_what-keys-add-showed"},
     }
 

@@ -6,10 +6,18 @@ from typing import Annotated
 
 from pydantic import Field
 
+from rig.acquisition.session.marks import MarksFile
 from rig.acquisition.session.records import CaptureId, CaptureRecord, SessionFile
 from service.kinds.base import Model
 
-__all__ = ["CaptureId", "CaptureRecord", "FindingLine", "SessionFile", "SessionProof"]
+__all__ = [
+    "CaptureId",
+    "CaptureRecord",
+    "FindingLine",
+    "MarksFile",
+    "SessionFile",
+    "SessionProof",
+]
 
 
 class FindingLine(Model):

@@ -14,6 +14,7 @@ from pathlib import Path, PurePosixPath
 from common.errors import InputError, NotFoundError
 from rig.acquisition.cameras.base import FrameStatus
 from rig.acquisition.session.index import read_index
+from rig.acquisition.session.marks import read_marks
 from rig.acquisition.session.storage import Disk
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm", ".webp")
@@ -57,8 +58,9 @@ def pictures_in_folder(folder: Path) -> tuple[Picture, ...]:
 
 
 def pictures_in_session(folder: Path, captures: Sequence[str] = ()) -> tuple[Picture, ...]:
-    """The whole pictures of a session's captures; all captures without a list.
+    """The whole pictures of a session's captures; without a list of all that are not rejected.
 
+    A picture that is rejected by itself is left out in any case.
     Raises :class:`NotFoundError` for a capture that is not there, and :class:`InputError` where
     there are no pictures.
     """
@@ -70,17 +72,22 @@ def pictures_in_session(folder: Path, captures: Sequence[str] = ()) -> tuple[Pic
             f"session {folder.name!r} has no capture {unknown[0]!r}",
             f"it has {', '.join(sorted(records)) or 'none'}",
         )
+    marks = read_marks(folder)
     found = [
         Picture(frame.camera, f"{name}-{frame.shot}", folder / frame.file.path)
-        for name in captures or sorted(records)
+        for name in captures or sorted(n for n in records if not marks.rejects_capture(n))
         for frame in records[name].frames
         if not frame.raw
         and frame.status != FrameStatus.INCOMPLETE
+        and not marks.rejects_picture(name, frame)
         and is_picture(PurePosixPath(frame.file.path).name)
     ]
     if not found:
+        but = " but rejected ones" if marks.rejected else ""
         raise InputError(
-            "pictures-none", f"session {folder.name!r} holds no pictures", "take a capture first"
+            "pictures-none",
+            f"session {folder.name!r} holds no pictures{but}",
+            "take a capture first",
         )
     return tuple(sorted(found, key=lambda p: (p.camera, p.frame)))
 

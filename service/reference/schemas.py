@@ -20,6 +20,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from common.files.strict import child_model, key_of
+from rig.acquisition.session.marks import MarksFile
 from rig.acquisition.session.records import CaptureRecord, SessionFile
 from rig.acquisition.station.stationfile import StationFile
 from rig.build.mounts.planmodel import PlanFile
@@ -114,6 +115,7 @@ def documents(folder: Path) -> dict[Path, str]:
         folder / "station.schema.json": schema_text(StationFile, "Rigwright station file"),
         folder / "session.schema.json": schema_text(SessionFile, "Rigwright session"),
         folder / "capture.schema.json": schema_text(CaptureRecord, "Rigwright capture"),
+        folder / "marks.schema.json": schema_text(MarksFile, "Rigwright marks of a session"),
         folder / "catalogue.schema.json": schema_text(CatalogueFile, "Rigwright catalogue file"),
         folder / "mount.schema.json": schema_text(SystemFile, "Rigwright mount file"),
         folder / "plan.schema.json": schema_text(PlanFile, "Rigwright mount plan"),

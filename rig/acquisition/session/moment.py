@@ -27,7 +27,8 @@ def settled(folder: Path) -> list[tuple[str, Path | bytes]]:
         tables = {entry.path: _bytes(folder, entry.path) for entry in index.manifest.tables}
         whole = all(sha256(tables[entry.path]) == entry.sha256 for entry in index.manifest.tables)
         if whole and before == _bytes(folder, paths.SESSION):
-            changing = {paths.SESSION: before, **tables}
+            marks = _bytes(folder, paths.MARKS)
+            changing = {paths.SESSION: before, **tables, **({paths.MARKS: marks} if marks else {})}
             rest = [entry.path for entry in index.files() if entry.path not in changing]
             return [*changing.items(), *((path, _there(folder, path)) for path in rest)]
         time.sleep(_PAUSE_S)

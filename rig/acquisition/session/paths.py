@@ -7,6 +7,9 @@ from pathlib import Path
 
 CAPTURE_ID = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
 SESSION = "session.json"
+MARKS = "marks.json"
+"""What people think of the pictures: the one file that may change afterwards."""
+
 IMAGES = "images/rig1"
 """COLMAP's image path is ``images``; ``rig1`` is the rig's name there."""
 

@@ -13,6 +13,7 @@ from pathlib import Path
 from common.errors import InputError
 from rig.acquisition.session import paths
 from rig.acquisition.session.index import SessionIndex, read_index
+from rig.acquisition.session.marks import read_marks
 from rig.acquisition.session.records import CaptureEntry, CaptureRecord, FileEntry, contradictions
 from rig.acquisition.session.storage import Disk, file_sha256, sha256
 from rig.acquisition.session.tables import tables
@@ -73,7 +74,8 @@ def verify_session(folder: Path) -> SessionCheck:
         *_files(folder, listed),
         *_tables(index),
         *_contradictions(index),
-        *_extras(folder, {entry.path for entry in listed}),
+        *_extras(folder, {paths.SESSION, paths.MARKS, *(entry.path for entry in listed)}),
+        *_marks(folder),
     ]
     size = sum(entry.bytes for entry in listed)
     partial = sum(record.state == "partial" for record in index.records)
@@ -88,6 +90,13 @@ def _files(folder: Path, listed: Iterable[FileEntry]) -> Iterator[SessionFinding
         elif path.stat().st_size != entry.bytes or file_sha256(path) != entry.sha256:
             text = f"{entry.path} is not as it was written"
             yield SessionFinding(SessionFindingKind.CHANGED, entry.path, text)
+
+
+def _marks(folder: Path) -> Iterator[SessionFinding]:
+    try:
+        read_marks(folder)
+    except InputError as error:
+        yield SessionFinding(SessionFindingKind.CHANGED, paths.MARKS, error.problem)
 
 
 def _tables(index: SessionIndex) -> Iterator[SessionFinding]:
@@ -137,5 +146,5 @@ def _extras(folder: Path, known: set[str]) -> Iterator[SessionFinding]:
         if top == paths.INCOMPLETE:
             text = "a capture is being written, or was when the program was stopped"
             yield SessionFinding(SessionFindingKind.INTERRUPTED, name, text)
-        elif name not in known and name != paths.SESSION:
+        elif name not in known:
             yield SessionFinding(SessionFindingKind.EXTRA, name, f"{name} belongs to no capture")

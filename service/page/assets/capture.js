@@ -3,6 +3,7 @@
 import { at, follow, get, pause, post } from "./api.js";
 import { field, fill, h, problem } from "./dom.js";
 import { watch } from "./job.js";
+import { replaced } from "./judged.js";
 import { sheet } from "./pictures.js";
 
 /** The form and the result for one rig. `know` is told how the rig is now. */
@@ -19,9 +20,12 @@ export function capturing(rig, signal) {
   const others = h("p", { class: "note" });
   let own = "";
   let counting = null;
+  let former = null; // what is taken again
 
   async function go(event) {
     event.preventDefault();
+    const again = former;
+    former = null;
     if (counting) { counting.abort(); return; }
     const id = captureId();
     const asked = {
@@ -35,7 +39,8 @@ export function capturing(rig, signal) {
       fire.disabled = true;
       own = at(`/v1/captures/${id}`);
       const job = await post(rig.links.captures, asked);
-      await watch(place, job, (done) => outcome(done), signal);
+      if (again) await replaced(again.session, again.record.capture_id, id);
+      await watch(place, job, outcome, signal);
       if (!signal.aborted) await kept(place, own, signal);
     } catch (error) {
       if (!signal.aborted) fill(place, problem(error));
@@ -44,6 +49,15 @@ export function capturing(rig, signal) {
       fire.disabled = false;
       fire.textContent = "Fire";
     }
+  }
+
+  function outcome(job) {
+    const { record, session: name } = job.result;
+    return sheet(name, record, signal, () => {
+      [session.value, shots.value, interval.value] = [name, record.shots, record.interval_us / 1000];
+      former = { session: name, record };
+      element.requestSubmit();
+    });
   }
 
   const element = h("form", { class: "capture", onsubmit: go },
@@ -60,7 +74,7 @@ export function capturing(rig, signal) {
     others.textContent = other ? `The rig is at work for ${now.asked_by || "somebody else"}.` : "";
     if (other && now.doing.startsWith(at("/v1/captures/"))) {
       own = now.doing; // shown here as well: everybody at the rig sees the last capture
-      shown(place, now.doing, signal);
+      shown(place, now.doing, outcome, signal);
     }
   } };
 }
@@ -82,18 +96,13 @@ async function counted(seconds, button, stopped, left) {
   return true;
 }
 
-async function shown(place, path, signal) {
+async function shown(place, path, outcome, signal) {
   try {
     await follow(await get(path, signal), () => {}, signal);
     const job = await get(path, signal);
     fill(place, job.result ? outcome(job) : problem({ message: job.problem?.detail ?? job.status }));
     if (!job.result) await kept(place, path, signal);
   } catch { /* its own view tells */ }
-}
-
-function outcome(job) {
-  const { record, session } = job.result;
-  return sheet(session, record);
 }
 
 /** What a capture that failed left in its session all the same. */
@@ -106,7 +115,7 @@ async function kept(place, path, signal) {
     const found = await get(`/v1/sessions/${encodeURIComponent(name)}`, signal).catch(() => null);
     if (!found?.captures.some((capture) => capture.capture_id === id)) continue;
     const record = await get(`/v1/sessions/${encodeURIComponent(name)}/captures/${encodeURIComponent(id)}`, signal);
-    place.append(...[sheet(name, record)].flat());
+    place.append(...sheet(name, record, signal));
     return;
   }
 }

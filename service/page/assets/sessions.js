@@ -86,7 +86,7 @@ function capture(name, own, entry, signal) {
     loaded = true;
     try {
       const record = await get(`${own}/captures/${encodeURIComponent(entry.capture_id)}`, signal);
-      fill(place, sheet(name, record));
+      fill(place, sheet(name, record, signal));
     } catch (error) {
       loaded = false;
       if (!signal.aborted) fill(place, problem(error));
