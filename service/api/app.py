@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
@@ -124,5 +125,7 @@ def create_app(service: Service) -> FastAPI:
 async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     service: Service = app.state.service
     service.start()
+    # The first who looks at a form would wait for what is the same ever after.
+    threading.Thread(target=examples.prepare, name="examples", daemon=True).start()
     yield
     await to_thread.run_sync(service.stop)

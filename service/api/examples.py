@@ -29,3 +29,9 @@ def list_rig_examples() -> RigExampleList:
 def read_rig_schema() -> dict[str, Any]:
     """Read what a rig may say: the JSON schema (draft 2020-12) of a rig file."""
     return rig_schema()
+
+
+def prepare() -> None:
+    """Make once what all answers of this module are made of."""
+    example_rigs()
+    rig_schema()

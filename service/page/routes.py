@@ -62,5 +62,7 @@ def _answer(name: str) -> Response:
     if asset is None:
         raise NotFoundError("path", f"the page has no part {name!r}", "begin at /")
     # Asked for again each time: a service that was brought up to date shows its new page at once.
-    headers = {"Cache-Control": "no-cache", "Content-Security-Policy": POLICY}
+    # Browsers ask for the icon with each view.
+    kept = "max-age=3600" if name.endswith(".svg") else "no-cache"
+    headers = {"Cache-Control": kept, "Content-Security-Policy": POLICY}
     return Response(asset.content, media_type=asset.media_type, headers=headers)

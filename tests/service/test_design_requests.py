@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 import tomllib
+from contextlib import closing
+from pathlib import Path
 
 import jsonschema
 import pytest
 from pydantic import ValidationError
+from service_helpers import wait_for
 from starlette.testclient import TestClient
 
 from rig.specification.examples import example_text
 from rig.specification.rigfile import RigFile
 from rig.specification.strategies import Strategy
-from service.api.app import make_app
+from service.api.app import create_app, make_app
+from service.api.context import Service
 from service.kinds.design import DesignRequest
+from service.settings import read_settings
+from service.tasks.examples import example_rigs, rig_schema
 
 RIG = tomllib.loads(example_text("face"))
 
@@ -40,3 +46,12 @@ def test_what_a_rig_may_say_is_read_from_the_service() -> None:
     with pytest.raises(jsonschema.ValidationError, match="cameras"):
         jsonschema.validate(RIG | {"cameras": "many"}, schema)
     assert schema == RigFile.model_json_schema()
+
+
+def test_what_forms_are_drawn_from_is_made_before_it_is_asked_for(tmp_path: Path) -> None:
+    made = (example_rigs, rig_schema)
+    for one in made:
+        one.cache_clear()
+    service = Service(read_settings(data_dir=tmp_path), {})
+    with closing(service), TestClient(create_app(service)):
+        wait_for(lambda: all(one.cache_info().currsize for one in made))

@@ -47,6 +47,13 @@ def test_unchanged_parts_are_not_sent_again(client: TestClient) -> None:
     assert other.status_code == 200
 
 
+def test_the_icon_is_kept_and_all_else_asked_for_again(client: TestClient) -> None:
+    """Browsers ask for it with each view."""
+    kept = {name: client.get(f"/page/{name}").headers["cache-control"] for name in assets()}
+    assert kept.pop("icon.svg") == "max-age=3600"
+    assert set(kept.values()) == {"no-cache"}
+
+
 @pytest.mark.parametrize(
     "name", ["gone.js", "..%2Froutes.py", "routes.py", "%2e%2e", "__init__.py"]
 )
