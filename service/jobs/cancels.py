@@ -5,6 +5,9 @@ from __future__ import annotations
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
+
+from sqlalchemy.exc import SQLAlchemyError
 
 from service.jobs.notifier import Notifier
 from service.store import Store
@@ -23,6 +26,7 @@ class Cancels:
         self._notifier = notifier
         self._lock = threading.Lock()
         self._events: dict[str, threading.Event] = {}
+        self._unwritten: set[str] = set()
 
     @contextmanager
     def running(self, job_id: str) -> Iterator[threading.Event]:
@@ -40,14 +44,31 @@ class Cancels:
                 del self._events[job_id]
 
     def cancel(self, job_id: str, kind: str) -> JobRecord:
-        """Ask a job to stop. Raises :class:`~common.errors.ConflictError` if it has ended."""
-        record = self._store.jobs.request_cancel(job_id, kind)
+        """Ask a job to stop. Raises :class:`~common.errors.ConflictError` if it has ended.
+
+        A job that runs here stops also where the disk is too full to write that it should.
+        """
+        try:
+            record = self._store.jobs.request_cancel(job_id, kind)
+        except SQLAlchemyError:
+            with self._lock:
+                if job_id not in self._events:
+                    raise
+                self._unwritten.add(job_id)
+            record = replace(self._store.jobs.get(job_id, kind), cancel_requested=True)
         with self._lock:
             event = self._events.get(job_id)
         if event is not None:
             event.set()
         self._notifier.notify(job_id)
         return record
+
+    def asked(self, job_id: str) -> bool:
+        """Whether a job was asked to stop, written down or not."""
+        with self._lock:
+            if job_id in self._unwritten:
+                return True
+        return self._store.jobs.get(job_id).cancel_requested
 
     def stop_all(self) -> None:
         """Ask all to stop; unlike cancelled ones they are marked as interrupted."""

@@ -121,7 +121,10 @@ class JobManager:
                 self._keep(job, self._work(job, folder, cancel), folder / "files")
         except RigwrightError as error:
             failed = error
-            write_at_last(lambda: end_without_result(self._store, job.id, failed), self._stopping)
+            write_at_last(
+                lambda: end_without_result(self._store, self._cancels, job.id, failed),
+                self._stopping,
+            )
         finally:
             shutil.rmtree(folder, ignore_errors=True)
             self._notifier.notify(job.id)
@@ -198,11 +201,11 @@ class JobManager:
         }
 
 
-def end_without_result(store: Store, job_id: str, error: RigwrightError) -> None:
+def end_without_result(store: Store, cancels: Cancels, job_id: str, error: RigwrightError) -> None:
     """Write down how a job ended that has no result: failed, cancelled, or interrupted."""
     if not isinstance(error, CancelledError):
         status, fields = JobStatus.FAILED, error_fields(error)
-    elif store.jobs.get(job_id).cancel_requested:
+    elif cancels.asked(job_id):
         status, fields = JobStatus.CANCELLED, None
     else:
         status, fields = JobStatus.INTERRUPTED, error_fields(interrupted())

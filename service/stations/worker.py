@@ -295,7 +295,8 @@ class StationWorker:
             logs.job_id.reset(token)
 
     def _end(self, job: JobRecord, error: RigwrightError) -> None:
-        self._write(lambda: end_without_result(self._context.store, job.id, error))
+        context = self._context
+        self._write(lambda: end_without_result(context.store, context.cancels, job.id, error))
 
     def _write(self, write: Callable[[], None]) -> None:
         # Where it cannot be written before the service ends, the next start settles the job.

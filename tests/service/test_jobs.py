@@ -296,6 +296,19 @@ class TestFullDisk:
         job = ended(store, ask(store, manager, "misbehave", how="refuse"))
         assert (job.problem or {})["problem"] == "seven is not a number of cameras"
 
+    def test_a_job_is_cancelled_though_that_cannot_be_written(
+        self, store: Store, manager: JobManager, cancels: Cancels, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        request = self.refusing(store.jobs.request_cancel, 10**6)
+        monkeypatch.setattr(store.jobs, "request_cancel", request)
+        monkeypatch.setattr(store.jobs, "end", self.refusing(store.jobs.end, 3))
+        job = ask(store, manager, "count", to=10_000)
+        wait_for(lambda: store.jobs.get(job).progress)
+        assert cancels.cancel(job, "count").cancel_requested
+        assert ended(store, job).status is JobStatus.CANCELLED
+        with pytest.raises(OperationalError):  # nothing runs here that could be stopped
+            cancels.cancel(job, "count")
+
     def test_progress_that_cannot_be_written_loses_nothing(
         self, store: Store, manager: JobManager, monkeypatch: pytest.MonkeyPatch
     ) -> None:
