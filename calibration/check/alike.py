@@ -29,6 +29,7 @@ GAIN = 0.1
 """Turned pictures that are turned back fit by so much better, and all of them."""
 
 QUARTERS = (2, 1, 3)
+FEW = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,21 +42,40 @@ class Righted:
 
 
 def turned_back(epoch: Epoch, start: Consensus) -> Righted:
-    """Pictures of all cameras that are turned by quarters or mirrored, turned back."""
-    now = _off_px(epoch, start)
-    if 2 * (now > OFF_PX).sum() <= len(now):
+    """Pictures of all cameras that are turned by quarters or mirrored, turned back.
+
+    Of two cameras one spoils the other, and no others tell which: there each is tried alone, too.
+    """
+    now, seen = _off_px(epoch, start), np.unique(epoch.camera)
+    if 2 * (now > OFF_PX).sum() < len(seen):
         return Righted(epoch, start, ())
-    names = tuple(epoch.camera_names[int(k)] for k in np.unique(epoch.camera))
-    tries = [(_turn(q), messages.all_turned(90 * q), 90.0 * q) for q in QUARTERS]
-    tries.append((np.diag([-1.0, 1.0]), messages.all_mirrored(), -1.0))
     middle = (np.array(epoch.image_size_px, np.float64)[epoch.camera] - 1.0) / 2.0
-    for turn, sentence, value in tries:
-        back = replace(epoch, pixel=(epoch.pixel - middle) @ turn + middle)
-        found = consensus(back)
-        left = _off_px(back, found)
-        if (left < OFF_PX).all() and left.sum() < GAIN * now.sum():
-            return Righted(back, found, (Finding(Kind.LENS_CHANGED, names, sentence, value=value),))
+    for who in (seen, *(seen[[k]] for k in range(len(seen)) if len(seen) == FEW)):
+        own = np.isin(epoch.camera, who)[:, None]
+        names = tuple(epoch.camera_names[int(k)] for k in who)
+        for turn, sentence, value in _turns(names if len(who) < len(seen) else ()):
+            pixel = np.where(own, (epoch.pixel - middle) @ turn + middle, epoch.pixel)
+            back = replace(epoch, pixel=pixel)
+            found = consensus(back)
+            left = _off_px(back, found)
+            if (left < OFF_PX).all() and left.sum() < GAIN * now.sum():
+                told = Finding(Kind.LENS_CHANGED, names, sentence, value=value)
+                return Righted(back, found, (told,))
     return Righted(epoch, start, ())
+
+
+def _turns(one: tuple[str, ...]) -> list[tuple[Floats, str, float]]:
+    """What turns pixels about the middle (n, 2) back, from the right, and what to say of it."""
+    tries = [
+        (
+            _turn(q),
+            messages.turned(one[0], 90 * q) if one else messages.all_turned(90 * q),
+            90.0 * q,
+        )
+        for q in QUARTERS
+    ]
+    mirrored = messages.mirrored(one[0]) if one else messages.all_mirrored()
+    return [*tries, (np.diag([-1.0, 1.0]), mirrored, -1.0)]
 
 
 def _off_px(epoch: Epoch, found: Consensus) -> Floats:

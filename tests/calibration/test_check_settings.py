@@ -72,6 +72,14 @@ def test_what_a_setting_does_to_the_pictures_of_all_cameras_is_one_story(name: s
     assert len(result.findings) == 1
 
 
+@pytest.mark.parametrize("name", ["turned", "on the side", "mirrored"])
+def test_of_two_cameras_the_one_with_turned_pictures_is_told(name: str) -> None:
+    seen = with_pixels(ALL[name][0], (3,))
+    result = checked(seen.subset(np.flatnonzero(np.isin(seen.camera, (2, 3)))))
+    told = [f for f in result.findings if f.kind is not Kind.CAMERA_MISSING]
+    assert [(f.kind, f.subjects) for f in told] == [(Kind.LENS_CHANGED, ("cam4",))], result.sentence
+
+
 @pytest.mark.parametrize(("share", "words"), [(0.01, "+1.0 %"), (-0.2, "-20.0 %")])
 def test_all_lenses_changed_by_much_are_no_prints_of_another_size(share: float, words: str) -> None:
     cameras = tuple(
