@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import difflib
 import math
+import os
 from collections.abc import Collection, Sequence
+from pathlib import PurePath
 
 
 def did_you_mean(word: str, known: Collection[str], otherwise: str | None = None) -> str:
@@ -16,6 +18,12 @@ def did_you_mean(word: str, known: Collection[str], otherwise: str | None = None
     if close:
         return f"did you mean {close[0]}?"
     return f"choose one of {', '.join(known)}" if otherwise is None else otherwise
+
+
+def as_text(name: str | PurePath) -> str:
+    """A file's name as one line of text; by their codes what is no text, or moves the cursor."""
+    text = os.fsencode(name).decode("utf-8", "backslashreplace")
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
 def percent_cut(share: float, decimals: int = 2) -> str:

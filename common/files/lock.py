@@ -52,7 +52,7 @@ def lock_file(path: Path, note: str) -> KernelLock:
     handle = _opened(path)
     lock = _locked(handle)
     os.ftruncate(handle, 0)
-    os.pwrite(handle, note.encode()[:_LARGEST_NOTE_BYTES], 0)
+    os.pwrite(handle, os.fsencode(note)[:_LARGEST_NOTE_BYTES], 0)
     return lock
 
 

@@ -6,7 +6,9 @@ options are read when it is asked for (``service.cli.lazy``).
 
 from __future__ import annotations
 
+import io
 import os
+import sys
 from typing import Annotated
 
 import typer
@@ -84,4 +86,7 @@ def main() -> None:
     """Run the command line."""
     for name, count in ONE_BLAS_THREAD.items():
         os.environ.setdefault(name, count)
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        # Names of files need not be text, and are printed all the same, as errors are.
+        sys.stdout.reconfigure(errors="backslashreplace")
     app()

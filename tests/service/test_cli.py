@@ -91,6 +91,14 @@ def test_an_address_that_is_none_is_named(tmp_path: Path) -> None:
     assert done.returncode == 2 and "cannot listen on not-an-address" in done.stderr
 
 
+@pytest.mark.slow
+def test_a_folder_whose_name_is_no_text_is_printed_all_the_same(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "service.cli", "practice", "--out", b"latin \xfc"]
+    strict = {**os.environ, "PYTHONPATH": str(HERE.parents[1]), "PYTHONIOENCODING": "utf-8:strict"}
+    done = subprocess.run(command, cwd=tmp_path, env=strict, capture_output=True, check=False)
+    assert done.returncode == 0 and rb"latin \udcfc" in done.stdout, done.stderr
+
+
 def test_the_version() -> None:
     assert re.match(r"^rigwright \S+\n$", rigwright("--version").stdout)
 

@@ -230,6 +230,29 @@ class Previewing(Protocol):
         ...
 
 
+@runtime_checkable
+class FileFed(Protocol):
+    """What a :class:`CameraDevice` tells besides where its capabilities say ``by_files``.
+
+    By the thread that the camera belongs to. None of it raises.
+    """
+
+    def between(self) -> Sequence[Frame]:
+        """Files that came since the capture before and until this one was armed, without content.
+
+        They are no pictures of this one; those of the one before may be late.
+        """
+        ...
+
+    def kinds(self) -> frozenset[str]:
+        """Media types that the newest exposure of before brought, empty when there is none."""
+        ...
+
+    def unread(self) -> str:
+        """What came since :meth:`CameraDevice.arm` and cannot be filed, by name; else empty."""
+        ...
+
+
 class CameraBackend(Protocol):
     """One way to reach cameras.
 

@@ -28,7 +28,8 @@ TIME_TAGS = ("DateTimeOriginal", "SubSecTimeOriginal", "OffsetTimeOriginal")
 def read_exif(path: Path) -> Mapping[str, str]:
     """The tags of :data:`TAGS` that the file has, as text; empty when it has none.
 
-    A body's number that stands only in the maker's notes (older bodies) is found too.
+    A body's number that stands only in the maker's notes (older bodies) is found too. OSError
+    when the file cannot be opened.
     """
     found = _process(path, details=False)
     if found and "EXIF BodySerialNumber" not in found:
@@ -46,11 +47,11 @@ def _process(path: Path, *, details: bool) -> Mapping[str, Any]:
 
     # It warns of every file without EXIF, which is none of the user's business.
     logging.getLogger("exifread").setLevel(logging.ERROR)
-    try:
-        with path.open("rb") as file:
+    with path.open("rb") as file:
+        try:
             return dict(exifread.process_file(file, details=details))
-    except Exception:  # noqa: BLE001  makers' notes break parsers in any way; the picture is good
-        return {}
+        except Exception:  # noqa: BLE001  makers' notes break parsers in any way; the picture is good
+            return {}
 
 
 def exposure_us(tags: Mapping[str, str]) -> float | None:

@@ -19,6 +19,12 @@ SET_APART = frozenset({"thumbs", "thumbnails", "previews", "proxies", "cache", "
 """Folders in which programs keep what is no picture of a camera, in small letters."""
 
 
+def is_apart(path: Path, below: Path) -> bool:
+    """Whether a file lies in a folder that is hidden or set apart."""
+    folders = path.relative_to(below).parts[:-1]
+    return any(f[0] in ".@#$" or f.lower() in SET_APART for f in folders)
+
+
 @dataclass(frozen=True)
 class Stamp:
     """What changes when a file is written to, and what stays when it is renamed."""
@@ -26,6 +32,11 @@ class Stamp:
     size: int
     modified_ns: int
     node: tuple[int, int] = (0, 0)
+
+    @property
+    def written(self) -> tuple[int, int]:
+        """The same without what changes where a share is mounted again."""
+        return self.size, self.modified_ns
 
 
 def _glimpse(path: Path, size: int) -> str:
@@ -97,18 +108,18 @@ class FolderWatch:
         """Whether a file is a picture by its name, and in no folder that is hidden or set apart."""
         if path.suffix.lower() not in self._suffixes or path.name.startswith("."):
             return False
-        folders = path.relative_to(below).parts[:-1]
-        return not any(f[0] in ".@#$" or f.lower() in SET_APART for f in folders)
+        return not is_apart(path, below)
 
-    def unfinished(self, below: Path) -> dict[tuple[int, int], str]:
-        """Files of other names, by what stays when they are renamed: pictures that are to be."""
+    def others(self, below: Path) -> dict[Path, Stamp]:
+        """Files of other names: pictures that are to be, and what is none."""
         found = {}
         for path in below.rglob("*"):
             if not self._counts(path, below):
                 with suppress(OSError):
                     stat = path.lstat()
                     if S_ISREG(stat.st_mode):
-                        found[stat.st_dev, stat.st_ino] = path.name
+                        node = stat.st_dev, stat.st_ino
+                        found[path] = Stamp(stat.st_size, stat.st_mtime_ns, node)
         return found
 
     def whole(self, path: Path, stamp: Stamp) -> bool:
@@ -127,8 +138,10 @@ class FolderWatch:
             return self._gaps[path, stamp]
 
     def tags(self, path: Path, stamp: Stamp) -> Mapping[str, str]:
-        """The EXIF of a whole file."""
+        """The EXIF of a whole file. OSError when it is gone."""
         with self._lock:
             if (path, stamp) not in self._tags:
-                self._tags[path, stamp] = read_exif(path)
+                tags = read_exif(path)
+                path.stat()  # that of a file that went meanwhile says nothing
+                self._tags[path, stamp] = tags
             return self._tags[path, stamp]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable
 from concurrent.futures import Future
 from pathlib import Path
@@ -13,6 +14,8 @@ from common.errors import DeviceError
 T = TypeVar("T")
 ANSWER_S = 0.5
 """A folder of a disk answers in milliseconds, one of a busy share in some hundred."""
+REMOUNT_S = 0.7
+"""How long a folder may be away: shares that are mounted again take some tenths of a second."""
 OPEN_S = 20.0
 """A large tree on a slow share is looked through once when it is opened."""
 
@@ -42,6 +45,18 @@ def answered(job: Callable[[], T], what: str, timeout_s: float = OPEN_S) -> T:
             f"{what} did not answer within {timeout_s:g} s",
             "see to its network share or disk, then try again",
         ) from None
+
+
+def patiently(job: Callable[[], T]) -> T:
+    """What ``job`` returns, tried again for ``REMOUNT_S`` while it raises OSError; then that."""
+    until = time.monotonic() + REMOUNT_S
+    while True:
+        try:
+            return job()
+        except OSError:
+            if time.monotonic() >= until:
+                raise
+            time.sleep(REMOUNT_S / 20.0)
 
 
 class FolderReach:

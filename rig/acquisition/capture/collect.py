@@ -12,6 +12,7 @@ from common.errors import RigwrightError
 from rig.acquisition.cameras.base import (
     CameraDevice,
     ClockSample,
+    FileFed,
     Frame,
     TimestampKind,
     TriggerKind,
@@ -71,10 +72,11 @@ class Collected:
     """What a camera gave. ``sent``: when it was told over its bus, shot by shot.
 
     ``asked_ns``: when it was asked for its pictures, on the host's clock; empty where they come
-    by themselves.
+    by themselves. ``between``: files that had come before a :class:`FileFed` camera was armed.
     """
 
     frames: tuple[Frame, ...] = ()
+    between: tuple[Frame, ...] = ()
     sent: tuple[Command, ...] = ()
     clock_samples: tuple[ClockSample, ...] = ()
     asked_ns: tuple[int, ...] = ()
@@ -118,13 +120,34 @@ class Collector:
             if self._device.capabilities.trigger is TriggerKind.SOFTWARE:
                 self._command()
             self._ask()
+            self._recall()
             self._wait()
             self._keep(clock_samples=read_clock(self._device))
         except RigwrightError as error:
             return self.so_far(self._said() or error.problem)
         except Exception as error:  # noqa: BLE001  a fault of one backend costs its camera only
             return self.so_far(f"its backend failed ({type(error).__name__}: {error})")
-        return self.so_far(self._said() or self._device.health().problem)
+        return self.so_far(self._said() or self._device.health().problem or self._unread())
+
+    def _recall(self) -> None:
+        """What a camera that is fed by files knows of before."""
+        if isinstance(self._device, FileFed):
+            self._keep(between=tuple(self._device.between()))
+            kinds = self._device.kinds()
+            if len(kinds) > 1 and not self._want.kinds:
+                # Its last exposure brought several: the others of this one come later.
+                self._want = replace(self._want, kinds=kinds)
+
+    def _unread(self) -> str:
+        """What came and is no picture, where pictures lack."""
+        got = self.so_far().frames
+        lacks = wanted(got, self._want, self._start_ns) < self._expected()
+        unread = self._device.unread() if lacks and isinstance(self._device, FileFed) else ""
+        return f"what came and cannot be filed: {unread}" if unread else ""
+
+    def _is_over(self) -> bool:
+        """Whether no more can come: a folder that went may be back any moment."""
+        return not (self._device.capabilities.by_files or self._device.health().connected)
 
     def _said(self) -> str:
         """Why a command failed: it tells more than what a camera says afterwards."""
@@ -191,7 +214,7 @@ class Collector:
             count = max(self._expected() + len(frames) - there, 1)
             # Once more at the end: what has come must be taken, however late this thread wakes.
             frames = self._take(count, max(0.0, min(SLICE_S, left)))
-            if left <= 0.0 or not self._device.health().connected:
+            if left <= 0.0 or self._is_over():
                 return
 
     def _take(self, count: int, timeout_s: float) -> tuple[Frame, ...]:

@@ -9,7 +9,8 @@ from rig.acquisition.cameras.base import Frame, FrameStatus, TriggerKind
 from rig.acquisition.session.records import CaptureRecord, FrameEntry, UnfiledEntry
 from rig.acquisition.station.spec import Station
 from rig.acquisition.synchrony.cameraframes import Method, Pair
-from rig.acquisition.synchrony.fileevidence import FileDelivery, FileEvidence, FiredShot
+from rig.acquisition.synchrony.fileclocks import FileDelivery, FiredShot
+from rig.acquisition.synchrony.fileevidence import FileEvidence
 
 RECALLED = 100
 """So many of the last captures are gone through: clocks drift, and old pictures come no more."""

@@ -21,7 +21,8 @@ from rig.acquisition.synchrony.cameraframes import CameraFrames, Method, Pairing
 from rig.acquisition.synchrony.capturedata import CameraPart, CaptureData
 from rig.acquisition.synchrony.clocks import ClockFitter, DeviceClock, TriggerTime, clock_jumped
 from rig.acquisition.synchrony.faults import Fault, FaultKind
-from rig.acquisition.synchrony.fileevidence import FileDelivery, FileEvidence, FiredShot
+from rig.acquisition.synchrony.fileclocks import FileDelivery, FiredShot
+from rig.acquisition.synchrony.fileevidence import FileEvidence
 from rig.acquisition.synchrony.imagechecks import image_faults, is_raw
 from rig.acquisition.synchrony.pairing import late_faults, pair
 from rig.acquisition.synchrony.swaps import swapped
@@ -200,6 +201,7 @@ def _delivery(station: Station, firing: Firing, part: CameraPart, wall_ns: int) 
     return FileDelivery(
         camera=part.plan.name,
         frames=firing.collected[part.plan.name].frames,
+        between=firing.collected[part.plan.name].between,
         shots=tuple(
             FiredShot(capture_id, t.shot, t.at_host_ns + wall_ns + round(received.lag_us * 1e3))
             for t in received.trigger_times
@@ -281,7 +283,7 @@ def _explained(pairing: Pairing, problem: str) -> Pairing:
         return pairing
     faults = tuple(
         replace(fault, text=f"{fault.text} ({problem})")
-        if fault.kind is FaultKind.MISSING
+        if fault.kind in (FaultKind.MISSING, FaultKind.FILE_MISSING)
         else fault
         for fault in pairing.faults
     )

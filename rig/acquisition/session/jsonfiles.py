@@ -16,9 +16,12 @@ ModelT = TypeVar("ModelT", bound=StrictModel)
 
 
 def json_bytes(document: object) -> bytes:
-    """A JSON file: readable, never NaN, the same bytes for the same content."""
+    """A JSON file: readable, never NaN, the same bytes for the same content.
+
+    What is no text in it is replaced: a name is not worth a capture.
+    """
     text = json.dumps(document, indent=1, allow_nan=False, ensure_ascii=False)
-    return (text + "\n").encode()
+    return (text + "\n").encode("utf-8", "replace")
 
 
 def model_bytes(model: StrictModel) -> bytes:

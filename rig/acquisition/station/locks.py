@@ -18,7 +18,9 @@ from pathlib import Path
 from common.closing import Closing
 from common.errors import ConflictError, InputError
 from common.files.lock import KernelLock, LockHeldError, lock_file
-from rig.acquisition.cameras.folder import FolderBackend, FolderOptions, owned
+from common.words import as_text
+from rig.acquisition.cameras.folder import FolderBackend
+from rig.acquisition.cameras.folderoptions import FolderOptions, owned
 from rig.acquisition.cameras.options import read_options
 from rig.acquisition.station.spec import CameraPlan, Station
 
@@ -108,11 +110,11 @@ class DeviceLocks(Closing):
 def lock_name(name: str) -> str:
     """The lock file of what ``name`` stands for: its end can be read, all of it tells it apart."""
     readable = re.sub(r"[^A-Za-z0-9]+", "-", name)[-60:].strip("-")
-    return f"{readable}.{hashlib.sha256(name.encode()).hexdigest()[:12]}.lock"
+    return f"{readable}.{hashlib.sha256(os.fsencode(name)).hexdigest()[:12]}.lock"
 
 
 def _me() -> str:
-    me = {"pid": os.getpid(), "host": platform.node(), "command": " ".join(sys.argv)[:300]}
+    me = {"pid": os.getpid(), "host": platform.node(), "command": as_text(" ".join(sys.argv))[:300]}
     return json.dumps(me, ensure_ascii=False)
 
 

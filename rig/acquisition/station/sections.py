@@ -174,8 +174,8 @@ class StationCameraSection(StrictModel):
         default_factory=list,
         max_length=4,
         description='Kinds of files that each shot must bring, such as `[".jpg", ".nef"]`: a shot '
-        "is waited for until all are there, and what is lacking is told. Without it: one picture "
-        "of any kind.",
+        "is waited for until all are there, and what is lacking is told. Without it: one picture, "
+        "and for folder cameras those kinds that the newest exposure in the folder has.",
     )
 
     @field_validator("files")

@@ -68,7 +68,7 @@ class CameraPlan:
     lag_tolerance_us: float = 20_000.0
     image_size_px: tuple[int, int] | None = None
     kinds: frozenset[str] = frozenset()
-    """Media types of the files that each shot must bring; empty: one picture of any kind."""
+    """Media types of the files that each shot must bring; empty: one of any kind."""
 
 
 @dataclass(frozen=True)

@@ -39,6 +39,22 @@ def _count(name: str, before: str) -> tuple[str, str]:
     return ("", "") if last == other and now not in then and then not in now else (last, other)
 
 
+def _ahead(name: str, before: str) -> int | None:
+    """How many pictures a name is after another, 0 or less before it; None: unknown."""
+    number, last = _count(name, before)
+    if not number or not last:
+        return None
+    step, top = int(number) - int(last), int(10 ** len(number))
+    if not len(number) == len(last) >= _LEAST_DIGITS:
+        return step
+    # No camera gives the number 0.
+    if step <= _WRAPPED - top:
+        return step + top - (int(number) > 0)
+    if step >= top - _WRAPPED:
+        return step - top + (int(last) > 0)
+    return step
+
+
 @dataclass
 class FileNumbers:
     """What is remembered of one camera's count."""
@@ -47,23 +63,24 @@ class FileNumbers:
     """The name of the last picture that was believed."""
     lost: set[int] = field(default_factory=set)
     """Numbers that were passed over: pictures that may still come."""
+    held: str = ""
+    """The name of the last picture since then that was held back."""
+    _astray: bool = False
     _fresh: int | None = None
     _fresh_now: int | None = None
 
     def ahead(self, name: str) -> int | None:
         """How many pictures after the last one it is, 0 or less before it; None: unknown."""
-        number, last = _count(name, self.last)
-        if not number or not last:
-            return None
-        step, top = int(number) - int(last), int(10 ** len(number))
-        if not len(number) == len(last) >= _LEAST_DIGITS:
-            return step
-        # No camera gives the number 0.
-        if step <= _WRAPPED - top:
-            return step + top - (int(number) > 0)
-        if step >= top - _WRAPPED:
-            return step - top + (int(last) > 0)
-        return step
+        return _ahead(name, self.last)
+
+    def goes_on(self, name: str) -> bool:
+        """Whether no number since the last believed one says that another count has begun."""
+        step = _ahead(name, self.held)
+        return not self._astray and (step is None or step > 0)
+
+    def hold(self, name: str) -> None:
+        """Remember that this picture came and was not believed."""
+        self._astray, self.held = not self.goes_on(name), name
 
     def begins_anew(self, name: str, shots: int) -> bool:
         """Whether the count was begun anew: the second capture in which such numbers follow.
@@ -83,7 +100,7 @@ class FileNumbers:
             if step is not None and step > 1:
                 top = 10 ** len(number)
                 self.lost |= {(int(number) - k) % top for k in range(1, min(step, _WRAPPED))}
-            self.last = name
+            self.last, self.held, self._astray = name, "", False
         self._fresh, self._fresh_now = (None if accepted else self._fresh_now), None
 
     @property

@@ -57,7 +57,7 @@ class PortLock:
         name = bare_url(url)
         # Two names of one port are one lock: the stable link and what it points to.
         real = os.path.realpath(name) if is_device_path(url) else name
-        digest = hashlib.sha256(real.encode()).hexdigest()[:16]
+        digest = hashlib.sha256(os.fsencode(real)).hexdigest()[:16]
         path = Path(tempfile.gettempdir()) / f"rigwright-trigger-{digest}.lock"
         program = Path(sys.argv[0]).name or "python"
         try:

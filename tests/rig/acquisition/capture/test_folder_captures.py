@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import os
 import shutil
-import threading
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -13,87 +12,19 @@ from datetime import datetime, timedelta
 from io import BytesIO
 from pathlib import Path
 
-import numpy as np
 import pytest
-from memoryrig import with_policy
 from PIL import Image
-from PIL.ExifTags import IFD, Base
+from PIL.ExifTags import Base
+from tethered import CAMERAS, Tethered, held, jpeg, station
 
 from common.errors import ConflictError, InputError
 from rig.acquisition.capture.filememory import recall
-from rig.acquisition.capture.rig import Rig
 from rig.acquisition.session.folder import Session
 from rig.acquisition.session.records import CaptureRecord
 from rig.acquisition.session.verify import verify_session
-from rig.acquisition.station.spec import CameraPlan, Station
+from rig.acquisition.station.spec import CameraPlan
 from rig.acquisition.synchrony.fileevidence import FileEvidence
 from rig.devices.station import open_station
-
-CAMERAS = ("cam01", "cam02", "cam03")
-
-
-def jpeg(at: datetime | None, seed: int, serial: str = "", scale: int = 1) -> bytes:
-    """A picture taken at ``at`` by its camera's clock; the seed is what it shows."""
-    size = (24 * scale, 32 * scale, 3)
-    noise = np.random.default_rng(seed).integers(60, 250, size, np.uint8)
-    exif = Image.Exif()
-    details = exif.get_ifd(IFD.Exif)
-    if at is not None:
-        details[Base.DateTimeOriginal] = at.strftime("%Y:%m:%d %H:%M:%S")
-        details[Base.SubsecTimeOriginal] = f"{at.microsecond:06d}"[:2]
-    if serial:
-        details[Base.BodySerialNumber] = serial
-    data = BytesIO()
-    Image.fromarray(noise).save(data, "JPEG", exif=exif)
-    return data.getvalue()
-
-
-def station(root: Path, **more: object) -> Station:
-    for name in CAMERAS:
-        (root / name).mkdir(parents=True, exist_ok=True)
-    plans = tuple(CameraPlan(name, "folder", name, **more) for name in CAMERAS)
-    options = {"folder": {"root": str(root), "settle_s": 0.05}}
-    made = Station("tethered", plans, backend_options=options)
-    return with_policy(made, frame_deadline_s=1.0, settle_s=0.15, min_free_mb=0.0)
-
-
-class Tethered:
-    """An open rig of folder cameras and a session."""
-
-    def __init__(self, rig: Rig, session: Session, root: Path) -> None:
-        self.rig, self.session, self.root = rig, session, root
-        self.seed = 0
-
-    def write(self, camera: str, name: str, at: datetime | None) -> bytes:
-        self.seed += 1
-        data = jpeg(at, self.seed)
-        (self.root / camera / name).write_bytes(data)
-        return data
-
-    def capture(
-        self, capture_id: str, deliver: Callable[[datetime], None], delay_s: float = 0.1
-    ) -> CaptureRecord:
-        """A capture during which files arrive; they are told when FIRE was."""
-
-        def soon() -> None:
-            fired = datetime.now()
-            time.sleep(delay_s)
-            deliver(fired)
-
-        def on(progress: object) -> None:
-            if getattr(progress, "stage", "") == "firing":
-                threading.Thread(target=soon).start()
-
-        return self.rig.capture(self.session, capture_id, progress=on).record
-
-    def sound(self, number: int) -> Callable[[datetime], None]:
-        """Every camera delivers its picture."""
-
-        def deliver(fired: datetime) -> None:
-            for name in CAMERAS:
-                self.write(name, f"DSC_{number:04d}.JPG", fired)
-
-        return deliver
 
 
 @pytest.fixture
@@ -103,10 +34,6 @@ def tethered(tmp_path: Path) -> Iterator[Tethered]:
         session = rig.new_session(tmp_path / "session")
         with session:
             yield Tethered(rig, session, root)
-
-
-def held(record: CaptureRecord) -> str:
-    return "; ".join(fault.text for fault in record.faults if fault.kind == "held-back")
 
 
 def test_sound_pictures_are_given_by_their_times(tethered: Tethered) -> None:

@@ -12,11 +12,8 @@ import pytest
 from rig.acquisition.cameras.base import Frame, FrameStatus
 from rig.acquisition.synchrony.cameraframes import Pairing
 from rig.acquisition.synchrony.faults import FaultKind
-from rig.acquisition.synchrony.fileevidence import (
-    FileDelivery,
-    FileEvidence,
-    FiredShot,
-)
+from rig.acquisition.synchrony.fileclocks import FileDelivery, FiredShot
+from rig.acquisition.synchrony.fileevidence import FileEvidence
 from rig.acquisition.synchrony.fileexposures import Span, file_exposures, file_time
 
 SECOND = 1_000_000_000
@@ -182,6 +179,8 @@ def numbered(*numbers: int | None) -> list[str]:
         ((345, 12, 346, 347), (1, 0, 0, 0)),
         ((345, None, 347, 346, 348), (1, 0, 1, 0, 0)),
         ((7, None, 9, None, 11), (1, 0, 1, 0, 1)),
+        ((9996, None, 3, 1), (1, 0, 0, 0)),  # another card twice: by its number the last is in turn
+        ((9980, None, 3, 4, 1, 2), (1, 0, 0, 0, 0, 0)),
     ],
 )
 def test_numbers_tell_where_no_time_does(
@@ -313,14 +312,24 @@ def random_offset(lots: random.Random) -> timedelta:
     )
 
 
-def arrivals(seed: int, captures: int, cameras: int = 9) -> Counter[str]:
-    """Deliver at random; counts what became of the pictures."""
+def set_offset(lots: random.Random) -> timedelta:
+    return timedelta(seconds=lots.gauss(0.0, 0.4)) if lots.random() > 0.025 else random_offset(lots)
+
+
+def arrivals(
+    seed: int, captures: int, cameras: int = 9, *, clocks_set: bool = False, wait_s: float = 0.0
+) -> Counter[str]:
+    """Deliver at random; counts what became of the pictures.
+
+    ``clocks_set``: by the computer's, of all cameras but one in forty. ``wait_s``: how much later
+    than told somebody fires at most.
+    """
     lots, counts = random.Random(seed), Counter[str]()  # noqa: S311  faults, not secrets
     evidence, at = FileEvidence(), NOON
     rig = [
         TetheredCamera(
             f"cam{k}",
-            random_offset(lots),
+            set_offset(lots) if clocks_set else random_offset(lots),
             lots.choice((0, 2, 3)),
             lots.random() < 0.85,
             lots.gauss(0.0, 2e-5),
@@ -331,12 +340,14 @@ def arrivals(seed: int, captures: int, cameras: int = 9) -> Counter[str]:
     steady = lots.random() < 0.3
     for number in range(captures):
         at += timedelta(seconds=15.0 if steady else lots.uniform(4.0, 90.0))
+        taken = at + timedelta(seconds=lots.uniform(0.0, wait_s)) if wait_s else at
         given = [
             FileDelivery(
                 camera.name,
-                tuple(delivered(lots, camera, rig, number, at)),
+                tuple(delivered(lots, camera, rig, number, taken)),
                 shots(number, at),
                 0,
+                round(wait_s * 1e9),
             )
             for camera in rig
         ]
@@ -402,6 +413,14 @@ def test_no_file_is_given_to_a_wrong_shot(seed: int) -> None:
     counts = arrivals(seed, 100)
     assert counts["wrong"] == 0, counts
     # Even where clocks are off and shots follow at a steady pace, others go on.
+    assert counts["right"] > 300, counts
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("wait_s", [0.0, 12.0])
+def test_no_file_is_given_to_a_wrong_shot_by_clocks_that_are_set(seed: int, wait_s: float) -> None:
+    counts = arrivals(seed, 100, clocks_set=True, wait_s=wait_s)
+    assert counts["wrong"] == 0, counts
     assert counts["right"] > 300, counts
 
 
