@@ -111,6 +111,11 @@ def _clock_comes_later(part: CameraPart) -> bool:
 
 
 def _stopped(firing: Firing, shots: int) -> list[Fault]:
+    report = firing.report
+    if report is not None and report.outcome is FireOutcome.UNKNOWN:
+        why = f" ({report.why})" if report.why else ""
+        text = f"the trigger box was lost before it could tell{why}"
+        return [Fault(FaultKind.BOX_LOST, f"{text}: only the pictures show what was fired")]
     if shots >= firing.order.shots:
         return []
     why = firing.report.why if firing.report is not None else ""

@@ -30,6 +30,7 @@ class FaultKind(StrEnum):
     BY_ARRIVAL = "by-arrival"
     SWAPPED = "swapped"
     NOT_FIRED = "not-fired"
+    BOX_LOST = "box-lost"
     FILED_AS_PNG = "filed-as-png"
     SLOW_DISK = "slow-disk"
 
@@ -42,6 +43,7 @@ HARMLESS = frozenset(
         FaultKind.LATE,
         FaultKind.COUNTER_GAP,
         FaultKind.BY_ARRIVAL,
+        FaultKind.BOX_LOST,
         FaultKind.FILED_AS_PNG,
         FaultKind.SLOW_DISK,
     }

@@ -295,6 +295,8 @@ def test_a_lost_box_whose_shot_the_pictures_show(bench: BenchMaker) -> None:
     assert record.state == "complete"
     assert record.trigger is not None and record.trigger.outcome == "unknown"
     assert {frame.told_by for frame in record.frames} == {"programmed"}
+    (fault,) = record.faults
+    assert fault.kind == "box-lost" and "only the pictures show what was fired" in fault.text
 
 
 def test_a_lost_box_and_no_picture_leave_the_fate_unknown(bench: BenchMaker) -> None:
