@@ -131,6 +131,42 @@ def test_files_go_to_the_camera_whose_number_they_carry(tmp_path: Path) -> None:
     assert left.health().counters["frames"] == 1
 
 
+def test_files_of_no_camera_are_told_and_those_of_others_are_not(tmp_path: Path) -> None:
+    backend = folder(tmp_path, by="serial", cameras={"left": "111", "right": "222"})
+    left = backend.open("left")
+    left.arm(SHOT)
+    for name, serial in (("b", "222"), ("c", ""), ("d", "333")):
+        (tmp_path / f"{name}.jpg").write_bytes(jpeg(serial))
+    assert left.wait_frames(1, 3 * SETTLE_S) == ()
+    assert left.unread() == "c.jpg (it names no body), d.jpg (of body 333)"
+
+
+def test_of_many_files_that_are_no_pictures_some_are_named(tmp_path: Path) -> None:
+    (tmp_path / "left").mkdir()
+    camera = folder(tmp_path, suffixes=[".PNG"]).open("left")
+    (tmp_path / "left" / "old.txt").touch()
+    camera.arm(SHOT)
+    (tmp_path / "left" / ".hidden").touch()
+    for k in range(8):
+        (tmp_path / "left" / f"{k}.jpg").touch()
+    said = camera.unread()
+    assert said.startswith("0.jpg (not of the kinds in 'suffixes'), 1.jpg")
+    assert said.endswith("and 3 more") and "old.txt" not in said and "hidden" not in said
+
+
+def test_what_came_between_two_armings_is_known(tmp_path: Path) -> None:
+    (tmp_path / "left").mkdir()
+    camera = folder(tmp_path).open("left")
+    camera.arm(SHOT)
+    (tmp_path / "left" / "a.jpg").write_bytes(jpeg("1"))
+    assert len(camera.wait_frames(1, 2.0)) == 1
+    (tmp_path / "left" / "late.jpg").write_bytes(jpeg("1"))
+    camera.arm(SHOT)
+    assert [frame.metadata["file"] for frame in camera.between()] == ["late.jpg"]
+    camera.arm(SHOT)
+    assert camera.between() == ()
+
+
 def test_numbers_seen_so_far_are_cameras(tmp_path: Path) -> None:
     (tmp_path / "a.jpg").write_bytes(jpeg("111"))
     (tmp_path / "b.jpg").write_bytes(jpeg("222"))
