@@ -268,16 +268,21 @@ class FileEvidence:
         ``in_turn``: by its number, one picture was made for each shot since the last that was
         believed.
         """
-        offset = clock_offset(at, shot, given.wait_ns)
+        offset, agreeing = clock_offset(at, shot, given.wait_ns), 0
+        # By a clock that is known it may have been taken by hand before the shot: twice is chance.
+        known = memory.offset
+        enough = 2 if known is not None and offset.high_ns < known.low_ns else 1
         for clue in memory.clues:
             then = {clue.shot.capture_id: clue.at}
-            if given.wait_ns and self._times.tell(given.camera, at, supposed=then) is False:
+            told = self._times.tell(given.camera, at, supposed=then) if given.wait_ns else None
+            if told is False:
                 continue
             if clue.shot.capture_id == shot.capture_id or offset.common(clue.offset) is None:
                 continue
             stepped = clue.stepped and in_turn
-            if stepped or not self._shifted(shot, offset, clue) or is_plain(offset):
-                return not self._came_late(memory, shot, offset)
+            agreeing += not self._shifted(shot, offset, clue) or is_plain(offset)
+            if stepped or agreeing >= enough:
+                return bool(told) or not self._came_late(memory, shot, offset)
         return False
 
     def _came_late(self, memory: CameraFiles, shot: FiredShot, offset: Span) -> bool:

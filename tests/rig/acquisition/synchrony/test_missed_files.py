@@ -165,6 +165,26 @@ def test_where_somebody_else_fires_a_clock_is_not_learned_from_a_picture_by_hand
     assert filed(files.capture(after(40), late)) == {"middle", "right"}
 
 
+def test_where_somebody_else_fires_a_clock_that_is_set_costs_one_picture() -> None:
+    """Also where the shots are nearer than the deadline."""
+    files, got = Files(wait_s=15.0), []
+    for k in range(7):
+        own = after(10 * k + (-3617 if k > 2 else 0))
+        found = files.capture(after(10 * k), all_at(after(10 * k), "left") | {"left": own})
+        got.append("left" in filed(found))
+    assert got == [True, True, True, False, True, True, True]
+
+
+def test_two_pictures_by_hand_are_no_clock_that_was_set() -> None:
+    """Each as long before its shot, and each shot's own picture lost."""
+    files = Files()
+    assert filed(files.capture(NOON, {"left": NOON}, names=("left",)))
+    files.capture(after(40), {}, names=("left",))
+    for seconds in (91, 173):
+        late = {"left": after(seconds - 30)}
+        assert not filed(files.capture(after(seconds), late, names=("left",)))
+
+
 def test_a_clock_that_drifts_all_day_stays_known() -> None:
     """A gain of 5e-5, 4.3 s a day, is that of a poor camera."""
     files = Files()
