@@ -103,7 +103,10 @@ def test_the_head_part_ends_at_the_neck_only_with_shoulders(tall: bool) -> None:
     assert head.crown - head.lower_end == pytest.approx(240.0, abs=8.0)
 
 
-@pytest.mark.parametrize("unit", sorted(MM_PER_UNIT))
+@pytest.mark.parametrize(
+    "unit",
+    [pytest.param(u, marks=() if u == "inch" else pytest.mark.slow) for u in sorted(MM_PER_UNIT)],
+)
 def test_units_follow_from_the_size(tmp_path: Path, unit: str) -> None:
     head = plain_head()
     head.apply_scale(1.0 / MM_PER_UNIT[unit])

@@ -19,6 +19,7 @@ import httpx2
 import pytest
 from service_helpers import (
     RIGWRIGHT,
+    InThisProcess,
     LiveServer,
     StartServer,
     TestClient,
@@ -29,10 +30,15 @@ from service_helpers import (
 )
 
 from common.files.ownership import files_of
+from common.progress import CancelToken, ProgressCallback
 from geometry.head import synthetic_head
 from rig.report.designfolder import FILE_NAMES
 from service.api.app import create_app
 from service.api.context import Service
+from service.jobs.engine import Task
+from service.jobs.process import ProcessEngine
+from service.kinds.base import RequestT, ResultT
+from service.kinds.design import DESIGN
 from service.kinds.queued import QUEUED
 from service.settings import read_settings
 from service.tasks.designing import write_scan
@@ -53,10 +59,21 @@ def small_rig() -> JSON:
     return tomllib.loads(small_rig_text())
 
 
+class OnlyDesignsInProcesses(ProcessEngine):
+    """A design is made as users have it; what reads and scores it saves the start of a process."""
+
+    def run(
+        self, task: Task[RequestT, ResultT], report: ProgressCallback, cancel: CancelToken
+    ) -> ResultT:
+        if task.kind is DESIGN:
+            return super().run(task, report, cancel)
+        return InThisProcess().run(task, report, cancel)
+
+
 @pytest.fixture(scope="module")
 def http(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
     settings = read_settings(data_dir=tmp_path_factory.mktemp("data"), workers_per_job=1)
-    service = Service(settings, QUEUED)
+    service = Service(settings, QUEUED, OnlyDesignsInProcesses())
     with TestClient(create_app(service), raise_server_exceptions=False) as client:
         yield client
     service.close()

@@ -23,7 +23,7 @@ from service.api.studies import StudyBody
 if TYPE_CHECKING:
     from playwright.sync_api import Route
 
-pytestmark = pytest.mark.needs_browser
+pytestmark = [pytest.mark.needs_browser, pytest.mark.slow]
 NAME = '"><img src=x onerror="window.ran=1"><svg onload="window.ran=1">'
 """What it would do it does within a frame of being made, wherever a page takes it for markup."""
 
@@ -100,7 +100,6 @@ def refused(visit: Visit, address: str) -> list[str]:
     return bodies
 
 
-@pytest.mark.slow
 def test_a_capture_is_seen_by_everybody_at_the_rig(
     visits: tuple[Visit, Visit], address: str
 ) -> None:
@@ -122,7 +121,6 @@ def test_a_capture_is_seen_by_everybody_at_the_rig(
     other.sound()
 
 
-@pytest.mark.slow
 def test_a_camera_is_aimed_on_the_screen_and_a_capture_goes_first(
     visits: tuple[Visit, Visit], address: str
 ) -> None:
@@ -173,7 +171,6 @@ NAMED = {
 }
 
 
-@pytest.mark.slow
 def test_markup_in_a_name_is_a_name(visits: tuple[Visit, Visit], address: str) -> None:
     """The rig and the subject of a session have it already."""
     one, _ = visits
@@ -209,7 +206,6 @@ def test_markup_in_a_name_is_a_name(visits: tuple[Visit, Visit], address: str) -
     one.go("Rig")
 
 
-@pytest.mark.slow
 def test_one_fires_the_other_is_told_and_a_crash_fires_nothing_again(
     visits: tuple[Visit, Visit], serving: Serving, box: FakeTrigger
 ) -> None:
@@ -246,7 +242,6 @@ def test_one_fires_the_other_is_told_and_a_crash_fires_nothing_again(
         visit.faults.clear()  # the browser tells of what nobody answered
 
 
-@pytest.mark.slow
 def test_a_session_is_looked_at_and_proven(visits: tuple[Visit, Visit]) -> None:
     _, other = visits
     other.go("Sessions")
@@ -257,7 +252,6 @@ def test_a_session_is_looked_at_and_proven(visits: tuple[Visit, Visit]) -> None:
     other.sound()
 
 
-@pytest.mark.slow
 def test_a_session_is_deleted_when_asked_twice_and_comes_back(
     visits: tuple[Visit, Visit], address: str
 ) -> None:
@@ -276,7 +270,6 @@ def test_a_session_is_deleted_when_asked_twice_and_comes_back(
     one.see("Prove it whole")
 
 
-@pytest.mark.slow
 def test_a_surface_is_asked_for_with_what_was_chosen(visits: tuple[Visit, Visit]) -> None:
     """Of the session that is there, with a design that only the browser is told of."""
     one, _ = visits
@@ -296,7 +289,6 @@ def test_a_surface_is_asked_for_with_what_was_chosen(visits: tuple[Visit, Visit]
     assert len(asked.pictures.captures) == 1
 
 
-@pytest.mark.slow
 def test_a_study_is_asked_for_with_what_was_chosen(visits: tuple[Visit, Visit]) -> None:
     """For scans that only the browser is told of."""
     one, _ = visits
@@ -336,7 +328,6 @@ def test_a_study_is_asked_for_with_what_was_chosen(visits: tuple[Visit, Visit]) 
     assert list(grid.form or ()) == ["free", "symmetric"]
 
 
-@pytest.mark.slow
 def test_a_job_that_begins_is_seen_to_before_its_first_progress(
     visits: tuple[Visit, Visit],
 ) -> None:
@@ -365,7 +356,6 @@ def test_views_of_an_empty_service(visits: tuple[Visit, Visit], view: str) -> No
     one.sound()
 
 
-@pytest.mark.slow
 def test_the_page_works_behind_a_proxy(visits: tuple[Visit, Visit], tmp_path: Path) -> None:
     browser = visits[0].page.context.browser  # one at a time is all that a thread may have
     assert browser is not None

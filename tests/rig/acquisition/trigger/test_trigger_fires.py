@@ -27,8 +27,8 @@ def check(tally: Tally, fires: int) -> None:
     assert sum(tally.faults.values()) >= fires
 
 
-def test_some_hundred_fires() -> None:
-    check(fire_side_by_side(200, seed=7, boxes=20), 200)
+def test_a_hundred_fires() -> None:
+    check(fire_side_by_side(100, seed=7, boxes=10), 100)
 
 
 @pytest.mark.slow
