@@ -31,6 +31,10 @@ from rig.build.mounts.tolerancing import (
     trials_for,
     yield_share,
 )
+from solver.result import ConstraintRow
+
+SUBJECT, LIMITS = object(), object()
+"""Handed on to the network as they are."""
 
 
 def tolerancer(
@@ -40,11 +44,16 @@ def tolerancer(
     tell: Callable[[float], None] = lambda _: None,
     cancel: threading.Event | None = None,
 ) -> Tolerancer:
-    monkeypatch.setattr(tolerancing, "MountNetwork", lambda *_: network)
     cameras = tuple(mount.camera for mount in mounts)
+
+    def made(*given: object) -> BoxNetwork:
+        assert given == (SUBJECT, LIMITS, cameras)
+        return network
+
+    monkeypatch.setattr(tolerancing, "MountNetwork", made)
     return Tolerancer(
-        None,
-        None,
+        SUBJECT,
+        LIMITS,
         cameras,
         mounts,
         tell=tell,
@@ -135,9 +144,16 @@ def test_a_rig_that_is_broken_has_no_tolerance_and_says_why(
     assert network.asked == 1
 
 
-def test_a_good_guess_saves_the_search(monkeypatch: pytest.MonkeyPatch) -> None:
-    network = box(8.0, 8.0)
-    found(network, monkeypatch)
+@pytest.mark.parametrize(("low", "high"), [(8.0, 8.0), (3.0, 8.0), (8.0, 3.0)])
+@pytest.mark.parametrize("steepness", [0.25, 1.0, 3.0])
+def test_a_good_guess_saves_the_search(
+    low: float, high: float, steepness: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    network = box(steepness * low, steepness * high)
+    network.bend = lambda off: steepness * off
+    x = found(network, monkeypatch)["x"]
+    # As good as the guess: half of NEAR below the wall.
+    assert (x.plus, x.minus) == pytest.approx((high * (1 - NEAR / 2), low * (1 - NEAR / 2)))
     # Where it stands, two trials on each side of a straight wall, one at the widest of the others:
     # 1 + 2 * 2 + 5 settings * 2 sides.
     assert network.asked == 1 + 4 + 10
@@ -168,6 +184,10 @@ def test_every_mount_is_asked_by_its_own_number(monkeypatch: pytest.MonkeyPatch)
             numbers.add(_index)
             assert camera.name == ("cam01", "cam02")[_index]
             return super().broken(_index, camera)
+
+        def rows(self, _index: int, camera: RigCamera) -> dict[str, ConstraintRow]:
+            assert camera.name == ("cam01", "cam02")[_index]
+            return super().rows(_index, camera)
 
     network = Numbered(np.full(3, -900.0), np.full(3, 900.0))
     mounts = (slider("cam01"), slider("cam02"))
