@@ -7,6 +7,7 @@ import os
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 from common.threads import ONE_BLAS_THREAD
 
@@ -23,6 +24,11 @@ _wrongly_skipped: list[str] = []
 # As commands and jobs have it; read when the libraries are loaded, which is after this.
 for _name, _count in ONE_BLAS_THREAD.items():
     os.environ.setdefault(_name, _count)
+
+
+# How long one example takes is the machine's affair; a test that hangs is ended by its timeout.
+settings.register_profile("without a deadline", deadline=None)
+settings.load_profile("without a deadline")
 
 
 @pytest.hookimpl(hookwrapper=True)
