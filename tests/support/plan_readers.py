@@ -6,6 +6,7 @@ Nothing here uses the code that draws: only the files, the words on them, and th
 from __future__ import annotations
 
 import io
+import itertools
 import re
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass
@@ -154,10 +155,11 @@ def dxf_lines(document: Drawing) -> list[str]:
 
 
 def _rows(texts: list[tuple[float, float, str]]) -> list[str]:
-    rows: dict[float, list[tuple[float, str]]] = {}
-    for x, y, words in texts:
-        rows.setdefault(round(y, 2), []).append((x, words))
-    return [" ".join(words for _, words in sorted(row)) for row in rows.values()]
+    """Texts that follow one another at one height: tables beside each other are drawn in turn."""
+    return [
+        " ".join(words for _, _, words in sorted(row))
+        for _, row in itertools.groupby(texts, lambda text: round(text[1], 2))
+    ]
 
 
 def dxf_geometry(document: Drawing) -> dict[str, tuple[np.ndarray, np.ndarray]]:

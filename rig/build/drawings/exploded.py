@@ -18,7 +18,7 @@ from rig.build.drawings.views import CAMERA_KINDS, plan_solids
 from rig.build.mounts.plan import MountPlan
 from rig.build.mounts.structure import Joint, Member, Solid, Structure
 from rig.build.parts.bill import BillLine
-from rig.build.parts.screws import screw_mm
+from rig.build.parts.screws import Sized, sized
 from rig.catalogue import Catalogue
 
 CROP_MM = 90.0
@@ -27,7 +27,7 @@ CROP_MM = 90.0
 APART_SHARE = 0.7
 """How far what is joined is drawn apart, as a share of :data:`CROP_MM`; brackets go half as far."""
 
-GRIDS = ((1, 1), (2, 1), (2, 2), (3, 2), (4, 2))
+GRIDS = ((1, 1), (2, 1), (2, 2), (3, 2), (4, 2), (5, 2))
 """Columns and rows of a sheet: the first that holds all joints, or the last on more sheets."""
 
 LINE_MM, TEXT_MM = 3.6, 2.2
@@ -74,14 +74,10 @@ def _kind(joint: Joint, structure: Structure, catalogue: Catalogue) -> Kind:
     placed |= {plate.id: "plate" for plate in structure.plates}
     placed |= {wedge.id: "wedge" for wedge in structure.wedges}
     on, other = (placed.get(end, "camera") for end in (joint.on, joint.other))
-    length = screw_mm(joint, structure, catalogue)
     counts = Counter(part.part for part in structure.parts if part.joint == joint.id)
-    counts.update(joint.fasteners)
-    takes = tuple(
-        (part, length if catalogue.find(part)[1].kind in ("cap-screw", "stud") else None, count)
-        for part, count in sorted(counts.items())
-    )
-    return on, other, takes
+    takes: list[Sized] = [(part, None, count) for part, count in counts.items()]
+    takes += sized(joint, structure, catalogue)
+    return on, other, tuple(sorted(takes, key=lambda entry: (entry[0], entry[1] or 0.0)))
 
 
 def _words(takes: Takes, joints: list[Joint], catalogue: Catalogue) -> list[str]:

@@ -10,7 +10,7 @@ from geometry.arrays import Floats
 from rig.build.drawings.frame import A3_LANDSCAPE_MM, BLOCK_MM, MARGIN_MM, Content, framed
 from rig.build.drawings.hidden import visible_lines
 from rig.build.drawings.items import Circle, Item, Line, Sheet, Text
-from rig.build.drawings.layout import DENOMINATORS, PlacedView, SheetView
+from rig.build.drawings.layout import PlacedView, SheetView
 from rig.build.drawings.tables import Table, table_items, table_sheets
 from rig.build.drawings.views import CAMERA_KINDS, plan_solids
 from rig.build.mounts.plan import MountPlan
@@ -86,11 +86,13 @@ def _rows(lines: Sequence[BillLine]) -> list[tuple[str, ...]]:
 
 
 def placed(view: SheetView, solids: Sequence[Solid], corner: Floats, room: Floats) -> PlacedView:
-    """Solids in the middle of a room (2,) that begins at ``corner`` (2,), as large as it allows."""
+    """Solids in the middle of a room (2,) that begins at ``corner`` (2,), as large as it allows.
+
+    At no round scale: what is not seen along an axis is not measured on the sheet.
+    """
     ends = np.concatenate([s.corners_mm for s in solids]) @ view.axes[:2].T
     low, high = ends.min(axis=0), ends.max(axis=0)
-    n = next((float(d) for d in DENOMINATORS if ((high - low) / d <= room).all()),
-             float(DENOMINATORS[-1]))  # fmt: skip
+    n = float(((high - low) / room).max())
     return PlacedView(view, low, high, corner + (room - (high - low) / n) / 2.0, n)
 
 

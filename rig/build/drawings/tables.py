@@ -17,6 +17,12 @@ TEXT_MM = 2.1
 PAD_MM = 1.5
 HEAD_MM = 6.0
 WIDEST_CELL_MM = 110.0
+BETWEEN_MM = 8.0
+"""Between two columns of tables."""
+
+SHRUNK = 0.85
+"""To what share of its width a table is narrowed so that it has a place beside another."""
+
 NUMBER_LIKE = frozenset("0123456789.-+×°() ∞–")
 
 
@@ -98,22 +104,45 @@ def table_items(table: Table, left: float, top: float, most_mm: float) -> list[I
 def table_sheets(
     tables: Sequence[Table], title: str, size_mm: tuple[float, float] = A4_MM
 ) -> list[Content]:
-    """Tables one below the other on as many sheets as they need."""
-    width, height = size_mm
-    bottom = MARGIN_MM + BLOCK_MM[1] + 6.0
-    most = width - 2.0 * MARGIN_MM - 10.0
-    pages: list[list[Item]] = [[]]
-    y = height - MARGIN_MM - 6.0
+    """Tables one below the other in columns, on as many sheets as they need."""
+    sheets = _Columns(size_mm)
     for table in tables:
         rest = table
         while rest.rows:
-            room = int((y - bottom - HEAD_MM) // ROW_MM) - 1
-            if room < min(3, len(rest.rows)):
-                pages.append([])
-                y = height - MARGIN_MM - 6.0
-                continue
-            part = Table(rest.title, rest.columns, rest.rows[:room])
-            pages[-1] += table_items(part, MARGIN_MM + 5.0, y, most)
-            y -= part.height_mm() + 6.0
-            rest = Table(f"{table.title} (continued)", table.columns, rest.rows[room:])
-    return [Content(title, size_mm, tuple(items), to_scale=False) for items in pages if items]
+            count = sheets.rows(rest)
+            sheets.put(Table(rest.title, rest.columns, rest.rows[:count]))
+            rest = Table(f"{table.title} (continued)", table.columns, rest.rows[count:])
+    return [Content(title, size_mm, tuple(p), to_scale=False) for p in sheets.pages if p]
+
+
+class _Columns:
+    """Where the next table goes: below the last one, beside it, or on a new sheet."""
+
+    def __init__(self, size_mm: tuple[float, float]) -> None:
+        self.pages: list[list[Item]] = [[]]
+        self._left, self._top = MARGIN_MM + 5.0, size_mm[1] - MARGIN_MM - 6.0
+        self._right, self._bottom = size_mm[0] - MARGIN_MM - 5.0, MARGIN_MM + BLOCK_MM[1] + 6.0
+        self._x, self._y, self._end = self._left, self._top, self._left
+
+    def rows(self, table: Table) -> int:
+        """How many rows of a table fit where it goes next; goes on where that is too few."""
+        least = SHRUNK * self._wide(table)
+        if self._room() < min(3, len(table.rows)) or self._x + least > self._right:
+            self._x, self._y = self._end + BETWEEN_MM, self._top
+            if self._x + least > self._right:
+                self.pages.append([])
+                self._x = self._end = self._left
+        return self._room()
+
+    def put(self, table: Table) -> None:
+        """A table where it goes next."""
+        wide = min(self._wide(table), self._right - self._x)
+        self.pages[-1] += table_items(table, self._x, self._y, wide)
+        self._y -= table.height_mm() + 6.0
+        self._end = max(self._end, self._x + wide)
+
+    def _wide(self, table: Table) -> float:
+        return min(sum(table.widths_mm(np.inf)), self._right - self._left)
+
+    def _room(self) -> int:
+        return int((self._y - self._bottom - HEAD_MM) // ROW_MM) - 1

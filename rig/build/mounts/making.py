@@ -12,7 +12,7 @@ from geometry.camera import RigCamera
 from geometry.subject import Subject
 from rig.build.mounts.clashes import find_clashes, pairs
 from rig.build.mounts.plan import Figures, MountPlan, Price
-from rig.build.mounts.relaxing import relaxed
+from rig.build.mounts.relaxing import VIEWS, relaxed
 from rig.build.mounts.rounding import Rounder, nearest, needs_rounding
 from rig.build.mounts.settings import CameraMount
 from rig.build.mounts.solids import camera_solids
@@ -131,11 +131,18 @@ class _Job:
         """Settings that exist; those of before where all do."""
         if not needs_rounding(holding.mounts):
             return holding.mounts
-        rounder = Rounder(
-            self.subject, self.limits, self.cameras, holding.mounts, spare=spare,
-            tell=lambda share: self.tell("round", 0.2 + 0.4 * share), cancel=self.cancel,
-        )  # fmt: skip
-        return rounder.run()
+        cameras, mounts = self.cameras, holding.mounts
+        designed = evaluate(self.subject, cameras, self.limits).feasible
+        for _ in range(VIEWS):
+            rounder = Rounder(
+                self.subject, self.limits, cameras, mounts, spare=spare,
+                tell=lambda share: self.tell("round", 0.2 + 0.4 * share), cancel=self.cancel,
+            )  # fmt: skip
+            mounts = rounder.run()
+            cameras = self.network(mounts)
+            if not designed or evaluate(self.subject, cameras, self.limits).feasible:
+                break
+        return mounts
 
     def price(self, naive: tuple[CameraMount, ...], built: tuple[CameraMount, ...]) -> Price:
         designed = figures(evaluate(self.subject, self.cameras, self.limits))

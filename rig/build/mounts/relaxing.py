@@ -24,6 +24,10 @@ from solver.result import Quality
 MOST_LOSS = 0.035
 """Share of the median sigma that room may cost: most of the 5 % that building may."""
 
+VIEWS = 3
+"""How often cameras are moved anew where they have come to see what they did not: a limit that was
+kept for all they saw before may be broken for that."""
+
 MOST_COVERAGE = 5e-4
 """Share of the region that may lose its second view for it."""
 
@@ -44,7 +48,6 @@ def relaxed(
     """
     mounts = tuple(_loose(camera, steps) for camera in cameras if not camera.fixed)
     designed = evaluate(subject, cameras, limits)
-    rounder = Rounder(subject, limits, cameras, mounts, spare=spare, tell=tell, cancel=cancel)
 
     def loss(tried: tuple[RigCamera, ...]) -> float:
         now = evaluate(subject, tried, limits)
@@ -52,9 +55,16 @@ def relaxed(
             return float("inf")
         return now.sigma_median_mm / designed.sigma_median_mm - 1.0
 
-    given = rounder.relax(loss, MOST_LOSS)
-    placed = {mount.name: mount.camera for mount in rounder.mounts}
-    return tuple(placed.get(c.name, c) for c in cameras), given
+    at = cameras
+    for _ in range(VIEWS):
+        rounder = Rounder(subject, limits, at, mounts, spare=spare, tell=tell, cancel=cancel)
+        given = rounder.relax(loss, MOST_LOSS)
+        mounts = tuple(rounder.mounts)
+        placed = {mount.name: mount.camera for mount in mounts}
+        at = tuple(placed.get(c.name, c) for c in cameras)
+        if not designed.feasible or evaluate(subject, at, limits).feasible:
+            break
+    return at, given
 
 
 def _second_views(quality: Quality) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -16,7 +17,7 @@ from rig.build.mounts.structure import (
     joint_side,
     levelling_feet,
 )
-from rig.build.parts.screws import screw_mm
+from rig.build.parts.screws import sized
 from rig.catalogue import Catalogue
 
 Members = Mapping[str, Member]
@@ -149,19 +150,11 @@ def _where(joint: Joint, members: Members) -> str:
 
 
 def _with_length(joint: Joint, structure: Structure, catalogue: Catalogue) -> Joint:
-    """The joint with its screws named by their length, where that is known."""
-    length = screw_mm(joint, structure, catalogue)
-    if length is None:
-        return joint
-    screws = {
-        part for part in joint.fasteners
-        if part in catalogue.fasteners and catalogue.fasteners[part].kind in ("cap-screw", "stud")
-    }  # fmt: skip
-    named = {
-        f"{part}, {length:g} mm long" if part in screws else part: count
-        for part, count in joint.fasteners.items()
-    }
-    return replace(joint, fasteners=named)
+    """The joint with its brackets too, and its screws named by their length, where it is known."""
+    named = Counter(p.part for p in structure.parts if p.joint == joint.id and p.id != joint.other)
+    for part, length, count in sized(joint, structure, catalogue):
+        named[part if length is None else f"{part}, {length:g} mm long"] += count
+    return replace(joint, fasteners=dict(named))
 
 
 def _with(joint: Joint) -> str:

@@ -16,7 +16,7 @@ from geometry.camera import RigCamera
 from rig.build.mounts.plan import MountPlan
 from rig.build.mounts.structure import Plate
 from rig.build.parts.masses import small_part_g
-from rig.build.parts.screws import end_caps, screw_mm
+from rig.build.parts.screws import end_caps, sized
 from rig.catalogue.catalogue import Catalogue
 
 PRINT_DENSITY_G_PER_CM3 = 1.27
@@ -230,10 +230,8 @@ def _pieces(plan: MountPlan, catalogue: Catalogue, prices: Prices) -> list[BillL
     """Placed parts, what joints are made with, and the caps of open ends; screws by length."""
     counts: Counter[Sized] = Counter((part.part, None) for part in plan.structure.parts)
     for joint in plan.structure.joints:
-        length = screw_mm(joint, plan.structure, catalogue)
-        for part, count in joint.fasteners.items():
-            screw = catalogue.find(part)[1].kind in ("cap-screw", "stud")
-            counts[part, length if screw else None] += count
+        for part, length, count in sized(joint, plan.structure, catalogue):
+            counts[part, length] += count
     for part, count in end_caps(plan.structure, catalogue).items():
         counts[part, None] += count
     return _counted(counts, catalogue, prices)

@@ -5,6 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+import numpy as np
+from scipy.spatial import ConvexHull
+
+from geometry.arrays import Floats
 from rig.build.mounts.structure import Joint, Member, Structure, levelling_feet
 from rig.catalogue import Catalogue
 from rig.catalogue.items import Bracket
@@ -27,6 +31,14 @@ UNDER_HEAD_MM = 6.0
 CAMERA_SCREW_MM = 12.0
 """Of the screw into a camera: 6 mm in the wedge, 6 mm in the camera."""
 
+SCREWS = ("cap-screw", "stud")
+
+CAP_MM = 2.0
+"""Thickness of an end cap's plate: what lies nearer to an end covers it."""
+
+LIDS = ("member", "joint", "plate", "bracket")
+"""Kinds of solids that may lie against an end."""
+
 BEYOND_MM = 4.0
 """How much deeper a bore is tapped than its screw reaches: the tap's lead."""
 
@@ -45,7 +57,7 @@ class Tap:
 def screw_mm(joint: Joint, structure: Structure, catalogue: Catalogue) -> float | None:
     """Length of a joint's screws; None where it has none, or what they go through is not known."""
     screw = next((part for part in map(catalogue.fasteners.get, joint.fasteners)
-                  if part is not None and part.kind in ("cap-screw", "stud")), None)  # fmt: skip
+                  if part is not None and part.kind in SCREWS), None)  # fmt: skip
     if screw is None or screw.diameter_mm is None:
         return None
     wedges = {wedge.id for wedge in structure.wedges}
@@ -55,12 +67,52 @@ def screw_mm(joint: Joint, structure: Structure, catalogue: Catalogue) -> float 
     if through is None:
         return None
     held = IN_ALUMINIUM if _tapped(joint, structure, catalogue) else IN_NUT
-    wanted = through + held * screw.diameter_mm
+    return _sold_mm(through + held * screw.diameter_mm)
+
+
+Sized = tuple[str, float | None, int]
+"""A part by its id, of a screw its length, and how many."""
+
+
+def sized(joint: Joint, structure: Structure, catalogue: Catalogue) -> tuple[Sized, ...]:
+    """What a joint is made with, screws of each length by themselves."""
+    length, ends = screw_mm(joint, structure, catalogue), _into_ends(joint, structure, catalogue)
+    found: list[Sized] = []
+    for part, count in joint.fasteners.items():
+        fastener = catalogue.fasteners.get(part)
+        if fastener is None or fastener.kind not in SCREWS:
+            found.append((part, None, count))
+            continue
+        found.append((part, length, count - ends))
+        if ends:
+            found.append((part, _end_screw_mm(joint, structure, catalogue), ends))
+    return tuple(found)
+
+
+def _into_ends(joint: Joint, structure: Structure, catalogue: Catalogue) -> int:
+    """How many screws of a pivot go into the core bore of the member that ends on it."""
+    placed = (catalogue.brackets.get(p.part) for p in structure.parts if p.joint == joint.id)
+    if not any(bracket is not None and bracket.kind == "pivot" for bracket in placed):
+        return 0
+    known = [(catalogue.fasteners[p].kind, n) for p, n in joint.fasteners.items()
+             if p in catalogue.fasteners]  # fmt: skip
+    screws = sum(count for kind, count in known if kind in SCREWS)
+    return max(0, screws - sum(count for kind, count in known if "nut" in kind))
+
+
+def _end_screw_mm(joint: Joint, structure: Structure, catalogue: Catalogue) -> float | None:
+    through = _through_mm(joint, structure, catalogue)
+    sizes = [f.diameter_mm for f in map(catalogue.fasteners.get, joint.fasteners)
+             if f is not None and f.kind in SCREWS and f.diameter_mm is not None]  # fmt: skip
+    return None if through is None or not sizes else _sold_mm(through + IN_ALUMINIUM * sizes[0])
+
+
+def _sold_mm(wanted: float) -> float:
     return float(next((length for length in LENGTHS_MM if length >= wanted - 1e-9), wanted))
 
 
 def taps(structure: Structure, catalogue: Catalogue) -> tuple[Tap, ...]:
-    """Every bore that screws through a plate, or the studs of levelling feet, are screwed into."""
+    """Every bore that screws through a plate or a pivot, or studs of feet, are screwed into."""
     members = {member.id: member for member in structure.members}
     found = []
     for joint in structure.joints:
@@ -74,7 +126,23 @@ def taps(structure: Structure, catalogue: Catalogue) -> tuple[Tap, ...]:
         thread = next(catalogue.fasteners[part].thread for part in joint.fasteners
                       if part in catalogue.fasteners)  # fmt: skip
         found.append(Tap(member.id, member.start, bores, thread, depth))
-    return (*found, *_foot_taps(structure, catalogue))
+    return (*found, *_foot_taps(structure, catalogue), *_pivot_taps(structure, catalogue))
+
+
+def _pivot_taps(structure: Structure, catalogue: Catalogue) -> Iterator[Tap]:
+    """The core bore of each member that ends on a pivot."""
+    members = {member.id: member for member in structure.members}
+    for joint in structure.joints:
+        bores = _into_ends(joint, structure, catalogue)
+        ends = [(float(np.linalg.norm(members[m].axis_mm[-k] - joint.point_mm)), m, k)
+                for m in (joint.on, joint.other) if m in members for k in (0, 1)]  # fmt: skip
+        length = _end_screw_mm(joint, structure, catalogue)
+        if bores and ends and length is not None:
+            _, name, last = min(ends)
+            words = members[name].start if last == 0 else f"opposite its {members[name].start}"
+            thread = next(catalogue.fasteners[p].thread for p in joint.fasteners)
+            depth = length - (_through_mm(joint, structure, catalogue) or 0.0) + BEYOND_MM
+            yield Tap(name, words, bores, thread, depth)
 
 
 def _foot_taps(structure: Structure, catalogue: Catalogue) -> Iterator[Tap]:
@@ -90,16 +158,32 @@ def _foot_taps(structure: Structure, catalogue: Catalogue) -> Iterator[Tap]:
 def end_caps(structure: Structure, catalogue: Catalogue) -> dict[str, int]:
     """How many caps the open ends of members take, by catalogue id.
 
-    An end that is screwed to a plate, or mitred to another member, is closed.
+    An end that is screwed to a plate or on a levelling foot, that is mitred to another member, or
+    against which another part lies, has no room for one.
     """
     closed = {tap.member for tap in taps(structure, catalogue)}
+    lids = [(solid.owner, ConvexHull(solid.corners_mm).equations) for solid in structure.solids
+            if solid.kind in LIDS]  # fmt: skip
     counts: dict[str, int] = {}
     for member in structure.members:
         cap = _cap(member, catalogue)
         if cap is not None:
-            open_ends = sum(mitre == 0.0 for mitre in member.mitres_deg) - (member.id in closed)
-            counts[cap.id] = counts.get(cap.id, 0) + open_ends
+            counts[cap.id] = counts.get(cap.id, 0) + _open_ends(member, closed, lids)
     return {part: count for part, count in counts.items() if count}
+
+
+def _open_ends(member: Member, closed: set[str], lids: list[tuple[str, Floats]]) -> int:
+    """How many of a member's ends a cap goes on; it is tapped at its start."""
+    count = 0
+    for end, mitre in enumerate(member.mitres_deg):
+        there, back = member.axis_mm[-end], member.axis_mm[1 if end == 0 else -2]
+        out = there + CAP_MM * (there - back) / np.linalg.norm(there - back)
+        covered = any(
+            owner != member.id and (planes[:, :3] @ out + planes[:, 3] <= 0.0).all()
+            for owner, planes in lids
+        )
+        count += mitre == 0.0 and not covered and not (end == 0 and member.id in closed)
+    return count
 
 
 def _cap(member: Member, catalogue: Catalogue) -> Bracket | None:

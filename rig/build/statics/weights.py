@@ -14,7 +14,7 @@ from rig.build.mounts.settings import CameraMount
 from rig.build.mounts.structure import Structure
 from rig.build.parts.bill import PRINT_DENSITY_G_PER_CM3
 from rig.build.parts.masses import small_part_g
-from rig.build.parts.screws import screw_mm
+from rig.build.parts.screws import sized
 from rig.catalogue import Catalogue
 
 
@@ -80,6 +80,6 @@ def weights(
             mass = float(ConvexHull(solid.corners_mm).volume) * PRINT_DENSITY_G_PER_CM3 * 1e-6
             yield Weight(np.mean(solid.corners_mm, axis=0), mass, cameras[solid.owner])
     for joint in structure.joints:
-        length = screw_mm(joint, structure, masses.catalogue)
-        mass = sum(masses.of_part(part, length) * n for part, n in joint.fasteners.items())
+        made = sized(joint, structure, masses.catalogue)
+        mass = sum(masses.of_part(part, length) * n for part, length, n in made)
         yield Weight(joint.point_mm, mass, "", joint.id)

@@ -28,7 +28,7 @@ from rig.build.mounts.systems.hanging import Rail, hang_all
 from rig.build.mounts.systems.heads import HeadKind
 from rig.build.mounts.systems.levelling import base_z_mm, levelled
 from rig.build.mounts.systems.outrigger import Hung, Outrigger, Z
-from rig.build.mounts.systems.pivots import pivot_arm_mm, pivot_part
+from rig.build.mounts.systems.pivots import pivot_arm_mm, pivot_bolts, pivot_part
 from rig.build.mounts.systems.ribs import Facet, Rib, bend_id, strips
 from rig.build.mounts.systems.stays import Stays, stayed
 from rig.catalogue.items import Bracket
@@ -339,7 +339,8 @@ class ArcHolding:
         """Facet to facet, upright to rib, foot to upright, struts between."""
         parts = self.system.outrigger
         two = {parts.corner.id: 2, parts.screw: 4, parts.t_nut: 4}
-        pivot = {parts.screw: 4, parts.t_nut: 4}
+        pivot = pivot_bolts(parts.pivot, parts.screw, parts.t_nut)
+        faces = pivot_bolts(parts.pivot, parts.screw, parts.t_nut, end=False)
         strip = {parts.screw: 4, parts.t_nut: 4}
         upright, foot, *_ = self._props(rib)
         bend = (rib.high_deg - rib.low_deg) / rib.count
@@ -350,7 +351,7 @@ class ArcHolding:
         nearest, pin = self._hinge(rib)
         level = float(pin[2] - upright.axis_mm[0, 2])
         out += [
-            Joint(f"{rib.id} a", upright.id, nearest.id, pin, level, nearest.lean_deg, pivot),
+            Joint(f"{rib.id} a", upright.id, nearest.id, pin, level, nearest.lean_deg, faces),
             Joint(
                 f"{rib.id} b", foot.id, upright.id, upright.axis_mm[0], self._behind_mm, None, two
             ),
@@ -409,7 +410,7 @@ class ArcHolding:
 
     def _base_joints(self, bars: list[Member]) -> list[Joint]:
         parts = self.system.outrigger
-        pivot = {parts.screw: 4, parts.t_nut: 4}
+        pivot = pivot_bolts(parts.pivot, parts.screw, parts.t_nut)
         out = []
         for member, ribs in zip(bars, pairwise(self._row()), strict=True):
             for end, (mark, rib) in enumerate(zip("ab", ribs, strict=True)):

@@ -86,12 +86,12 @@ def _under(member: Member, levelling: Levelling) -> Iterator[tuple[Joint, Placed
 def _one(
     member: Member, number: str, point_mm: Floats, along_mm: float, levelling: Levelling
 ) -> tuple[Joint, PlacedPart]:
-    name = f"{member.id} {LEVELLING}{number}"
+    name = f"{member.id} pad{number}"
     at = np.eye(4)
     at[:3, 3] = point_mm - levelling.lift_mm * Z
     # In a slot a T-nut holds the stud, in a bore the thread that is cut into it.
     nuts = {} if member.role == "upright" else {levelling.t_nut: 1}
-    joint = Joint(f"{name} a", member.id, name, point_mm, along_mm, None, nuts)
+    joint = Joint(name, member.id, name, point_mm, along_mm, None, nuts)
     return joint, PlacedPart(name, levelling.foot.id, LEVELLING, at, joint=joint.id)
 
 

@@ -18,6 +18,15 @@ def pivot_arm_mm(pivot: Bracket) -> float:
     return (pivot.size_mm or (20.0, 40.0, 20.0))[1] / 2.0
 
 
+def pivot_bolts(pivot: Bracket, screw: str, t_nut: str, *, end: bool = True) -> dict[str, int]:
+    """What a pivot is screwed down with: as many screws as it takes, and nuts for those in a slot.
+
+    ``end``: its second half lies on the end of a member, in whose core bore there is no nut.
+    """
+    count = pivot.bolts or 2
+    return {screw: count, t_nut: count - count // 2 if end else count}
+
+
 def pivot_part(
     joint: Joint,
     pivot: Bracket,

@@ -14,7 +14,7 @@ import numpy as np
 from geometry.arrays import Floats
 from rig.build.mounts.structure import Joint, Member, PlacedPart, Solid
 from rig.build.mounts.systems.corners import leg_mm
-from rig.build.mounts.systems.pivots import pivot_arm_mm, pivot_part
+from rig.build.mounts.systems.pivots import pivot_arm_mm, pivot_bolts, pivot_part
 from rig.catalogue.items import Bracket, Profile
 
 Z = np.array([0.0, 0.0, 1.0])
@@ -48,7 +48,7 @@ class StayParts:
     @property
     def pivots(self) -> dict[str, int]:
         """What a joint at a slope takes."""
-        return {self.screw: 4, self.t_nut: 4}
+        return pivot_bolts(self.pivot, self.screw, self.t_nut)
 
 
 @dataclass(frozen=True, eq=False)

@@ -29,10 +29,10 @@ from rig.build.drawings import (
 )
 from rig.build.drawings.annotate import spread
 from rig.build.drawings.figures import fixed, setting_text
-from rig.build.drawings.frame import fitted
+from rig.build.drawings.frame import A3_LANDSCAPE_MM, fitted
 from rig.build.drawings.items import Dimension, Line, Text, dimension_parts
 from rig.build.drawings.pdf import text_width_mm
-from rig.build.drawings.tables import Table, table_items
+from rig.build.drawings.tables import Table, table_items, table_sheets
 from rig.build.mounts.settings import Setting
 
 ROOT = Path(__file__).resolve().parents[4]
@@ -216,3 +216,20 @@ def test_figures_are_stated_as_finely_as_they_are_set() -> None:
     assert setting(0.25, 0.25) == "0.25"
     assert setting(12.3456, 0.0) == "12.3" and setting(12.3456, 0.0, "deg") == "12.35"
     assert fixed(-0.04, 1) == "0.0" and fixed(-0.06, 1) == "-0.1"
+
+
+def test_tables_of_a_whole_rig_fill_their_sheet_in_columns() -> None:
+    """Two long tables, one below the other, left two thirds of three sheets empty."""
+    rows = tuple((f"m{k}", "2020", f"{k}.0") for k in range(60))
+    tables = [Table(title, ("Member", "Profile", "Length mm"), rows) for title in ("One", "Two")]
+    (content,) = table_sheets(tables, "Members", A3_LANDSCAPE_MM)
+    texts = [item for item in content.items if isinstance(item, Text)]
+    left = [t.x_mm for t in texts if t.words.startswith("m")]
+    assert len(set(left)) >= 3 and len(left) == 120
+    right = max(item.points_mm[:, 0].max() for item in content.items if isinstance(item, Line))
+    assert right <= A3_LANDSCAPE_MM[0] - 10.0
+    # A4 is as wide as two of them; what a column does not hold goes on a second sheet.
+    pages = table_sheets([*tables, *tables], "Members")
+    told = [t for page in pages for t in page.items if isinstance(t, Text)]
+    assert sum(t.words.startswith("m") for t in told) == 240
+    assert sum(t.words == "One" for t in told) == 2 and "Two (continued)" in {t.words for t in told}

@@ -64,8 +64,8 @@ def test_more_kinds_than_a_sheet_holds_go_on_the_next(monkeypatch: pytest.Monkey
     monkeypatch.setattr("rig.build.drawings.exploded.GRIDS", ((2, 1),))
     plan = planned("arc")
     sheets = exploded_sheets(plan, bill_of_materials(plan, CATALOGUE).lines, CATALOGUE)
-    # Five kinds, and levelling feet in a slot and in a bore: two on a sheet.
-    assert len(sheets) == 4
+    # Five kinds, pivots on faces and on ends, levelling feet in a slot and in a bore.
+    assert len(sheets) == 5
     for write in (lambda s: pdf_bytes(s, "a"), lambda s: svg_bytes(s, "a"), dxf_bytes):
         assert len(write(sheets)) > 1000
 

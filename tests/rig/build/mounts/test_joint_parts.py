@@ -22,6 +22,7 @@ from rig.build.mounts.systemfile import system_from_mapping
 from rig.build.mounts.systems.base import Built
 from rig.build.mounts.systems.corners import corner_places, corner_solid, with_corners
 from rig.build.parts import bill_of_materials
+from rig.build.parts.screws import taps
 from rig.catalogue import load_catalogue
 from solver.quality import evaluate
 
@@ -83,8 +84,15 @@ def test_every_bracket_has_a_place_of_its_own(kind: str) -> None:
         if part.role == LEVELLING:
             assert sum(joints[part.joint].fasteners.values()) <= 1
             continue
-        # A bracket with two screws, one in each of the members; so has a pivot in each half.
-        assert sum(joints[part.joint].fasteners.values()) % 4 == 0
+        # Two screws, one in each of the members; so has a pivot, one in each of its halves. In a
+        # slot there is a nut for each; a member that ends on a pivot has a bore for it.
+        each = [p for p in parts if p.joint == part.joint]
+        bolts = sum(CATALOGUE.brackets[p.part].bolts or 0 for p in each)
+        fasteners = joints[part.joint].fasteners
+        assert fasteners["cap-screw-m5"] == bolts
+        tapped = [t for t in taps(made, CATALOGUE) if t.depth_mm == 16.0 and part.role == "pivot"]
+        ends = {joints[part.joint].on, joints[part.joint].other} & {t.member for t in tapped}
+        assert fasteners["t-nut-2020"] == bolts - len(ends), part.joint
 
 
 @pytest.mark.parametrize("kind", KINDS)

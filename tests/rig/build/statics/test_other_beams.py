@@ -14,7 +14,7 @@ from geometry.arrays import Floats
 from rig.build.mounts.structure import Member, Structure, levelling_feet
 from rig.build.mounts.systems.base import Built
 from rig.build.parts.masses import small_part_g
-from rig.build.parts.screws import screw_mm
+from rig.build.parts.screws import sized
 from rig.build.statics.sag import sags
 from rig.build.statics.weights import Masses
 from rig.catalogue import load_catalogue
@@ -124,9 +124,8 @@ def shifts(built: Built) -> Mapping[str, Floats]:
     for joint in structure.joints:
         end = next((e for e in (joint.on, joint.other) if e in frame.members), None)
         if end is not None:
-            length = screw_mm(joint, structure, CATALOGUE)
-            each = {p: small_part_g(p, length, CATALOGUE) or 0.0 for p in joint.fasteners}
-            mass_g = sum(each[p] * count for p, count in joint.fasteners.items())
+            made = sized(joint, structure, CATALOGUE)
+            mass_g = sum((small_part_g(p, long, CATALOGUE) or 0.0) * n for p, long, n in made)
             at = nearest(frame.members[end], joint.point_mm)
             frame.hang(at, joint.point_mm, mass_g / 1e3)
     frame.model.analyze_linear()
