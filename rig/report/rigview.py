@@ -14,7 +14,7 @@ from rig.report.colours import AFTER, BEFORE, BODY, FIXED
 from rig.report.scene import frustum_corners_mm
 from rig.report.subjectview import subject_traces
 from rig.report.surface import ViewMesh
-from rig.report.three import lines_trace, mesh_trace, scene_layout
+from rig.report.three import BEHIND_EYE, lines_trace, mesh_trace, scene_layout
 from rig.solids.bodies import place_body
 from solver.result import Design
 
@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 
 VIEW_SHARE = 0.42
 """Views are drawn to this share of the way to the subject, so that they do not hide it."""
+
+NAME_SHARE = np.array([0.13, 0.05])
+"""Width and height of a name as shares of the cameras' extent in the view."""
 
 
 def rig_figure(
@@ -45,7 +48,8 @@ def rig_figure(
     figure.add_trace(_names(design.cameras))
     figure.add_trace(_datum(layout))
     legend = {"orientation": "h", "x": 0.0, "y": 0.0, "yanchor": "top", "bgcolor": "rgba(0,0,0,0)"}
-    figure.update_layout(**scene_layout(1.02))
+    # Aimed below its middle: the nearest tick's figure is at the lower edge of the scene.
+    figure.update_layout(**scene_layout(0.97, aim_z=-0.14))
     figure.update_layout(legend=legend, margin={"l": 0, "r": 0, "t": 0, "b": 60})
     return figure
 
@@ -112,22 +116,45 @@ def _axes(cameras: tuple[RigCamera, ...], centre: Floats) -> Floats:
 def _names(cameras: tuple[RigCamera, ...]) -> go.Scatter3d:
     import plotly.graph_objects as go
 
-    # Above the body however it is rolled, where the name hides nothing.
-    at = np.array(
-        [
-            c.pose.to_rig(np.atleast_2d(c.camera.body.centre_camera_mm))[0]
-            + [0.0, 0.0, 0.5 * float(np.linalg.norm(c.camera.body.size_mm))]
-            for c in cameras
-        ]
-    )
+    at, places = name_places(cameras)
     return go.Scatter3d(
         x=at[:, 0],
         y=at[:, 1],
         z=at[:, 2],
         mode="text",
-        textposition="top center",
+        textposition=places,
         text=[esc(c.name) for c in cameras],
         name="names",
         hoverinfo="skip",
         textfont={"size": 20},
     )
+
+
+def name_places(cameras: tuple[RigCamera, ...]) -> tuple[Floats, list[str]]:
+    """Where each camera's name stands (N, 3), and on which side of that place.
+
+    Above its body however it is rolled; below, where another body or name is over it in the view
+    that is seen first.
+    """
+    middles = np.array([c.pose.to_rig(c.camera.body.centre_camera_mm[None])[0] for c in cameras])
+    halves = np.array([0.5 * float(np.linalg.norm(c.camera.body.size_mm)) for c in cameras])
+    right = np.cross(-np.array(BEHIND_EYE), [0.0, 0.0, 1.0])
+    up = np.cross(right, -np.array(BEHIND_EYE))
+    flat = middles @ np.stack([right / np.linalg.norm(right), up / np.linalg.norm(up)]).T
+    size = NAME_SHARE * max(float(np.ptp(flat, axis=0).max()), float(halves.max()))
+    signs: list[float] = []
+    taken = np.zeros((0, 2))
+
+    def covered(at: Floats, own: int) -> int:
+        """How many other bodies and earlier names are where a name would be."""
+        away = np.abs(flat - at) - halves[:, None] - size / 2.0
+        bodies = (away < 0.0).all(axis=1) & (np.arange(len(cameras)) != own)
+        return int(bodies.sum() + (np.abs(taken - at) < size).all(axis=1).sum())
+
+    for k, half in enumerate(halves):
+        options = {s: flat[k] + [0.0, s * (half + size[1] / 2.0)] for s in (1.0, -1.0)}
+        sign = min(options, key=lambda s: covered(options[s], k))
+        signs.append(sign)
+        taken = np.vstack([taken, options[sign]])
+    at = middles + (np.array(signs) * halves)[:, None] * [0.0, 0.0, 1.0]
+    return at, ["top center" if sign > 0.0 else "bottom center" for sign in signs]

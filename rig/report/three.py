@@ -16,6 +16,9 @@ LAMP = {"x": -4000, "y": -12000, "z": 9000}
 """Above the left shoulder of a viewer behind the cameras."""
 
 
+BEHIND_EYE = (-0.9, -1.45, 0.45)
+"""Where a viewer behind the cameras looks from at first, in units of the scene's box."""
+
 _PLACES = 4096.0
 _BITS = 512.0
 
@@ -83,7 +86,7 @@ def scene_layout(
         "nticks": 6,
         "visible": axes,
     }
-    look = np.array([-0.9, -1.45, 0.45] if behind else [-1.3, 1.1, 0.45]) / zoom
+    look = np.array(BEHIND_EYE if behind else (-1.3, 1.1, 0.45)) / zoom
     return {
         "scene": {
             "aspectmode": "data",
