@@ -1,7 +1,7 @@
 """Mount plans of the 4- to 9-camera face designs on a frame, a plate and an arc; a hundred cameras.
 
     python -m benchmarks.plans --designs FOLDER [--scan HEAD.glb]
-        [--out docs/explanation/mount-plans.md]
+        [--counts 4 5] [--out docs/explanation/mount-plans.md]
 
 FOLDER keeps the designs as faces-4.json to faces-9.json; those that are missing are designed
 first as ``benchmarks.faces`` does and written there. Run with OMP_NUM_THREADS=1: the seconds are
@@ -118,6 +118,8 @@ def main() -> None:
     parser.add_argument("--designs", type=Path, required=True, help="folder that keeps the designs")
     parser.add_argument("--scan", type=Path, help="a head scan; the bundled head without it")
     parser.add_argument("--starts", type=int, default=6, help="of designs that are missing")
+    parser.add_argument("--counts", type=int, nargs="*", default=COUNTS, help="of cameras")
+    parser.add_argument("--without-dome", action="store_true", help="leave out the hundred cameras")
     parser.add_argument("--out", type=Path, help="write the table to this file")
     chosen = parser.parse_args()
     spec = example_rig("face")
@@ -125,22 +127,27 @@ def main() -> None:
     prepared = prepare_subject(scan, replace(spec.subject_options, seed=spec.seed))
     table = [HEADER]
     for kind in KINDS:
-        for count in COUNTS:
+        for count in chosen.counts:
             cameras = designed(chosen.designs, count, spec, prepared, chosen.starts)
             table.append(planned(count, kind, cameras, prepared, spec.limits))
             print(table[-1], flush=True)
-    cameras, limits = dome(spec, prepared)
-    table.append(planned(len(cameras), "t-slot", cameras, prepared, limits))
-    print(table[-1], flush=True)
+    if not chosen.without_dome:
+        cameras, limits = dome(spec, prepared)
+        table.append(planned(len(cameras), "t-slot", cameras, prepared, limits))
+        print(table[-1], flush=True)
     if chosen.out:
         name = "the bundled head" if chosen.scan is None else chosen.scan.name
-        chosen.out.write_text(INTRODUCTION.format(name=name) + "\n".join(table) + "\n")
+        chosen.out.write_text(
+            INTRODUCTION.format(name=name, starts=chosen.starts) + "\n".join(table) + "\n"
+        )
 
 
 INTRODUCTION = """# Mount plans of the face designs
 
-Head: {name}. Designs and limits as in `face-designs.md`; every system with its defaults
-(`kind` alone): a ball head set in whole degrees, slides in whole millimetres.
+Head: {name}. Limits as in `face-designs.md`, designs by the strategy `exchange` from {starts}
+starts; every system with its defaults (`kind` alone): a ball head set in whole degrees, slides in
+whole millimetres, frames on levelling feet, with the back-stays, larger profiles and ties that
+they need.
 Written by
 `python -m benchmarks.plans --designs FOLDER --scan HEAD --out docs/explanation/mount-plans.md`.
 
