@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from fastapi import APIRouter
+from pydantic import JsonValue
 
 from service.kinds.base import Model
 from service.kinds.design import RigExample
@@ -26,7 +25,7 @@ def list_rig_examples() -> RigExampleList:
 
 
 @router.get("/v1/rig-schema")
-def read_rig_schema() -> dict[str, Any]:
+def read_rig_schema() -> dict[str, JsonValue]:
     """Read what a rig may say: the JSON schema (draft 2020-12) of a rig file."""
     return rig_schema()
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from functools import cache
 from pathlib import Path
-from typing import Any
+
+from pydantic import JsonValue
 
 from rig.specification.examples import example_names, example_text
 from rig.specification.rigfile import RigFile, parse_rig_file
@@ -18,7 +19,7 @@ def example_rigs() -> tuple[RigExample, ...]:
 
 
 @cache
-def rig_schema() -> dict[str, Any]:
+def rig_schema() -> dict[str, JsonValue]:
     """The JSON schema (draft 2020-12) of a rig file."""
     return RigFile.model_json_schema()
 
