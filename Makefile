@@ -33,7 +33,7 @@ $(STAMP): pyproject.toml constraints.txt
 	touch $(STAMP)
 
 demo: $(STAMP)
-	@echo "Designing seven cameras for the bundled head: about half a minute on two quiet cores."
+	@echo "Designing seven cameras for the bundled head: about a quarter of a minute on two quiet cores."
 	$(BIN)/rigwright demo --out $(OUT) --force
 	@echo "For the command rigwright in this terminal: . $(BIN)/activate"
 
