@@ -17,6 +17,7 @@ from calibration.check import messages
 from calibration.check.consensus import Consensus, by_camera, consensus, misfit_px
 from calibration.check.epoch import Epoch
 from calibration.check.hypotheses import ALL_LENSES, ALPHA, Cause, Hypothesis, hypotheses
+from calibration.check.shared import shared_by_some
 from calibration.check.suspects import fit_with
 from calibration.check.verdicts import Finding, Kind
 from geometry.arrays import Floats
@@ -91,7 +92,7 @@ def _turn(quarters: int) -> Floats:
 def alike(
     epoch: Epoch, state: State, tests: Sequence[Hypothesis] | None = None
 ) -> tuple[Hypothesis, ...]:
-    """The changes of all lenses alike that alone explain what several cameras show; or none.
+    """The changes of all or some lenses alike that alone explain what cameras show; or none.
 
     Targets of another size look much alike: they must explain clearly less.
     """
@@ -101,7 +102,11 @@ def alike(
     for causes in (focal, shift, [*focal, *shift]):
         left = fit_with(epoch, state, causes).chi2
         if left < enough:
-            sizes = [h for h in known if h.cause is Cause.SCALE]
-            by_size = fit_with(epoch, state, sizes).chi2
-            return tuple(causes) if by_size - left > chdtri(len(sizes), ALPHA) else ()
-    return ()
+            break
+    else:
+        causes, left = shared_by_some(epoch, state, known, enough)
+        if not causes:
+            return ()
+    sizes = [h for h in known if h.cause is Cause.SCALE]
+    by_size = fit_with(epoch, state, sizes).chi2
+    return tuple(causes) if by_size - left > chdtri(len(sizes), ALPHA) else ()

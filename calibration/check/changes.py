@@ -11,6 +11,7 @@ import numpy as np
 from calibration.adjustment.camera import INTERIOR, PER_CAMERA
 from calibration.check.diagnosis import Diagnosis
 from calibration.check.hypotheses import ALL_LENSES, Cause, Hypothesis, log_tail
+from calibration.check.scores import ScoreTests
 from calibration.check.subject import Subject
 from geometry.arrays import Floats
 
@@ -35,21 +36,24 @@ class Change:
 def changes(diagnosis: Diagnosis) -> tuple[Change, ...]:
     """The accepted causes with their sizes, from the fit in which all are free."""
     out = []
-    index = {id(h): k for k, h in enumerate(diagnosis.tests.hypotheses)}
     first = len(diagnosis.last.unknowns) - diagnosis.last.linear.freed.shape[1]
     for cause in diagnosis.accepted:
         size = cause.ways.shape[1]
-        k = index[id(cause)]
-        out.append(
-            Change(
-                cause,
-                diagnosis.last.unknowns[first : first + size],
-                float(diagnosis.outcomes.statistic[k]),
-                int(diagnosis.tests.dof[k]),
-            )
-        )
+        statistic, dof = _tested(diagnosis, cause)
+        change = diagnosis.last.unknowns[first : first + size]
+        out.append(Change(cause, change, statistic, dof))
         first += size
     return tuple(out)
+
+
+def _tested(diagnosis: Diagnosis, cause: Hypothesis) -> tuple[float, int]:
+    """Statistic and degrees of freedom of a cause when nothing is accounted for."""
+    for k, h in enumerate(diagnosis.tests.hypotheses):
+        if h is cause:
+            return float(diagnosis.outcomes.statistic[k]), int(diagnosis.tests.dof[k])
+    # Causes that some cameras share are none of those that every check tests.
+    alone = ScoreTests((cause,), diagnosis.first.linear)
+    return float(alone.run(diagnosis.first.score).statistic[0]), int(alone.dof[0])
 
 
 def camera_change(one: Change) -> Floats:

@@ -16,6 +16,7 @@ from calibration.check.epoch import Epoch, epoch_of
 from calibration.check.findings import findings, scale_estimate
 from calibration.check.gross import Corrected, corrected_epoch
 from calibration.check.hypotheses import ALPHA, Cause
+from calibration.check.standing import Told
 from calibration.check.subject import subject_of
 from calibration.check.tables import (
     Noise,
@@ -125,7 +126,8 @@ def judge(
         effect_of_mm(changes(diagnosis), subject),
         options,
     )
-    cameras = camera_checks(diagnosis, found, noise, options.hidden_limit_mm)
+    told = Told(tuple(alarms), before, checkable)
+    cameras = camera_checks(diagnosis, found, noise, options.hidden_limit_mm, told)
     reported = before
     if checkable or not before:
         reported = _after(before, verdicts(alarms, cameras, noise, diagnosis))

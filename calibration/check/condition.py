@@ -98,10 +98,12 @@ def _other_size(
         return None
     if (height, width) == camera.image_size_px:
         sentence = messages.on_its_side(camera.name, (width, height), camera.image_size_px)
+        state = "turned"
     else:
         sentence = messages.other_size(camera.name, (width, height), camera.image_size_px)
+        state = "pictures of another size"
     ratio = width / camera.image_size_px[0]
-    return Finding(Kind.LENS_CHANGED, (camera.name,), sentence, value=ratio)
+    return Finding(Kind.LENS_CHANGED, (camera.name,), sentence, value=ratio, state=state)
 
 
 def _softness(

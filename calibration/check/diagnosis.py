@@ -20,6 +20,7 @@ from calibration.check.fit import Fit, again, fit, refit
 from calibration.check.hypotheses import Cause, Hypothesis, hypotheses, log_tail
 from calibration.check.linear import Linear
 from calibration.check.scores import Outcomes, ScoreTests, estimate
+from calibration.check.shared import fewest
 from calibration.check.suspects import convicted, fit_with, is_lens
 from geometry.arrays import Bools, Floats, Ints
 
@@ -119,6 +120,7 @@ def diagnose(
         current = ScoreTests(tests.hypotheses, last.linear)
         present = current.run(last.score)
     accepted, last = _pruned(epoch, state, accepted, last)
+    accepted, last = fewest(epoch, state, tests.hypotheses, accepted, last)
     return Diagnosis(epoch, first, tests, outcomes, tuple(accepted), last, lost, state)
 
 

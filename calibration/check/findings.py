@@ -251,13 +251,15 @@ def _lens(one: Change, diagnosis: Diagnosis, found: Effects, subject: Subject) -
 
 
 def _all_lenses(group: list[Change], diagnosis: Diagnosis, subject: Subject) -> Finding:
-    """All lenses changed alike, or all pictures were cut or resized otherwise."""
-    names = tuple(diagnosis.epoch.camera_names[k] for k in sorted(by_camera(group[0])))
+    """Lenses of all or some cameras changed alike, or pictures were cut or resized otherwise."""
+    epoch = diagnosis.epoch
+    names = tuple(epoch.camera_names[k] for k in sorted(by_camera(group[0])))
     mm = effect_of_mm(group, subject)
     size = {one.cause.cause: one.change for one in group}
     share = float(size.get(Cause.ALL_FOCAL, np.zeros(1))[0])
     shift = tuple(float(v) for v in size.get(Cause.ALL_SHIFT, np.zeros(2)))
-    sentence = words.all_lenses(1e6 * share, (shift[0], shift[1]), mm)
+    some = names if len(names) < len(np.unique(epoch.camera)) else ()
+    sentence = words.all_lenses(1e6 * share, (shift[0], shift[1]), mm, some)
     worst = max(group, key=lambda one: one.statistic)
     return Finding(
         Kind.LENS_CHANGED,

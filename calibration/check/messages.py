@@ -162,21 +162,25 @@ def cropped(camera: str, shift_px: tuple[float, float], mm: float) -> str:
     )
 
 
-def all_lenses(ppm: float, shift_px: tuple[float, float], mm: float) -> str:
-    """All lenses changed alike, or all pictures were cut or resized alike."""
+def all_lenses(
+    ppm: float, shift_px: tuple[float, float], mm: float, some: tuple[str, ...] = ()
+) -> str:
+    """All lenses changed alike, or those of ``some``, or their pictures were cut alike."""
     x, y = shift_px
+    who = joined(some) if some else "all cameras"
     change = f"{ppm:+.0f} ppm" if abs(ppm) < MANY_PPM else f"{1e-4 * ppm:+.1f} %"
     effect = f"points at the subject shift by up to {length(mm)}."
     if not (x or y):
         return (
-            f"The focal lengths of all cameras have changed by {change}, as by temperature "
+            f"The focal lengths of {who} have changed by {change}, as by temperature "
             f"or by pictures of another size: {effect} Let the rig reach its temperature, then "
             "calibrate anew."
         )
     size = f"resized by {change} and " if ppm else ""
+    pictures = "their pictures" if some else "all pictures"
     return (
-        f"The images of all cameras are {size}shifted by ({x:+.1f}, {y:+.1f}) px against the "
-        "reference, as by another crop, binning or size of all pictures: set it as before, or "
+        f"The images of {who} are {size}shifted by ({x:+.1f}, {y:+.1f}) px against the "
+        f"reference, as by another crop, binning or size of {pictures}: set it as before, or "
         f"calibrate anew; {effect}"
     )
 

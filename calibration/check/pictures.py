@@ -84,13 +84,15 @@ def _turned(epoch: Epoch, found: Consensus, own: Ints, name: str) -> Finding | N
     if min(left, left_mirrored) > FLAT_SHARE * extent:
         return None
     if left_mirrored < 0.3 * left:
-        return Finding(Kind.LENS_CHANGED, (name,), messages.mirrored(name), value=-1.0)
+        told = messages.mirrored(name)
+        return Finding(Kind.LENS_CHANGED, (name,), told, value=-1.0, state="mirrored")
     angle = float(np.degrees(np.arctan2(rotation[1, 0], rotation[0, 0])))
     quarters = round(angle / QUARTER_DEG)
     if quarters % 4 == 0 or abs(angle - QUARTER_DEG * quarters) > NEAR_DEG:
         return None
     degrees = int(QUARTER_DEG) * (quarters % 4)
-    return Finding(Kind.LENS_CHANGED, (name,), messages.turned(name, degrees), value=degrees)
+    told = messages.turned(name, degrees)
+    return Finding(Kind.LENS_CHANGED, (name,), told, value=degrees, state="turned")
 
 
 def _planar(source: Floats, target: Floats) -> tuple[Floats, float]:

@@ -9,19 +9,18 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.special import chdtrc, chndtr
 
-from calibration.adjustment.camera import INTERIOR, PER_CAMERA
+from calibration.adjustment.camera import PER_CAMERA
 from calibration.adjustment.reliability import DELTA0
 from calibration.adjustment.residualgrid import residual_grid
 from calibration.adjustment.result import Calibration
-from calibration.check.changes import LOG10, changes
-from calibration.check.condition import LEAST_POINTS
+from calibration.check.changes import LOG10
 from calibration.check.consensus import Consensus
 from calibration.check.diagnosis import Diagnosis
 from calibration.check.effects import Effects, sensitivity
 from calibration.check.findings import scale_estimate
 from calibration.check.hypotheses import ALPHA, NOISE_SHARE, Cause
 from calibration.check.linear import Columns
-from calibration.check.scores import estimate
+from calibration.check.standing import Told, standing
 from calibration.check.verdicts import CameraCheck, CarrierCheck, Finding, Kind, LengthCheck
 from calibration.observations import Distance
 from geometry.arrays import Bools, Floats
@@ -61,17 +60,17 @@ def noise_of(diagnosis: Diagnosis) -> Noise:
 
 
 def camera_checks(
-    diagnosis: Diagnosis, found: Effects, noise: Noise, hidden_limit_mm: float
+    diagnosis: Diagnosis, found: Effects, noise: Noise, hidden_limit_mm: float, told: Told
 ) -> tuple[CameraCheck, ...]:
-    """One row for each camera of the reference."""
+    """One row for each camera of the reference, in agreement with what is told."""
     return tuple(
-        _camera(diagnosis, found, noise, k, hidden_limit_mm)
+        _camera(diagnosis, found, noise, k, hidden_limit_mm, told)
         for k in range(len(diagnosis.epoch.camera_names))
     )
 
 
 def _camera(
-    diagnosis: Diagnosis, found: Effects, noise: Noise, k: int, hidden_limit_mm: float
+    diagnosis: Diagnosis, found: Effects, noise: Noise, k: int, hidden_limit_mm: float, told: Told
 ) -> CameraCheck:
     accepted = {h.cause for h in diagnosis.accepted if h.subject == k}
     # A camera that stands is shown without what others' changes did to it through the targets.
@@ -83,19 +82,7 @@ def _camera(
     mine = residual[own]
     pose, lens = _test(diagnosis, Cause.POSE, k), _test(diagnosis, Cause.LENS, k)
     sees = sensitivity(k, diagnosis.first.linear.spread, found, Columns.of(epoch))
-    px, mm = _pose_effect(diagnosis, found, k)
-    verdict, reason = Kind.FINE, ""
-    if diagnosis.nobody_stands:
-        verdict, reason = Kind.CANNOT_TELL, "most cameras changed"
-    elif Cause.POSE in accepted:
-        verdict = Kind.CAMERA_MOVED
-    elif Cause.LENS in accepted:
-        verdict = Kind.LENS_CHANGED
-    elif len(mine) < LEAST_POINTS or sees is None:
-        verdict, reason = Kind.CANNOT_TELL, f"{len(mine)} targets, {LEAST_POINTS} are needed"
-    elif sees.hidden_mm > hidden_limit_mm:
-        verdict = Kind.CANNOT_TELL
-        reason = f"movements that shift points by {sees.hidden_mm:.2g} mm could hide"
+    stands = standing(diagnosis, found, k, told, sees, hidden_limit_mm)
     mine = mine if len(mine) else np.full((1, 2), np.nan)
     return CameraCheck(
         epoch.camera_names[k],
@@ -106,11 +93,11 @@ def _camera(
         float(noise.factor[k]),
         *pose,
         *lens,
-        px,
-        mm,
+        stands.effect_px,
+        stands.effect_mm,
         sees,
-        verdict,
-        reason,
+        stands.verdict,
+        stands.reason,
         residual_grid(epoch.pixel[own], residual[own], epoch.image_size_px[k]),
     )
 
@@ -126,18 +113,6 @@ def _test(diagnosis: Diagnosis, cause: Cause, subject: int) -> tuple[float, floa
                 float(outcomes.log_p[k] / LOG10),
             )
     return float("nan"), float("nan"), float("nan")
-
-
-def _pose_effect(diagnosis: Diagnosis, found: Effects, camera: int) -> tuple[float, float]:
-    """Effect of the movement that the images suggest, px and mm."""
-    for one in changes(diagnosis):
-        if one.cause.cause is Cause.POSE and one.cause.subject == camera:
-            return found.of(camera, one.change, INTERIOR)
-    for h in diagnosis.tests.hypotheses:
-        if h.cause is Cause.POSE and h.subject == camera:
-            change, _ = estimate(h, diagnosis.last.linear, diagnosis.last.score)
-            return found.of(camera, change, INTERIOR)
-    return float("nan"), float("nan")
 
 
 def carrier_checks(

@@ -67,7 +67,8 @@ class Finding:
     then. ``effect_px``: root mean square shift of image points; ``effect_mm``: of points at the
     subject when the old calibration goes on being used; both NaN where they mean nothing.
     ``value`` is the finding's own number (a scale, a factor of noise), ``sigma`` its sigma.
-    ``tolerable``: sure, but so small that the old calibration still serves.
+    ``tolerable``: sure, but so small that the old calibration still serves. ``state``: in two words
+    why the camera was not checked, where the kind alone does not say it.
     """
 
     kind: Kind
@@ -82,6 +83,7 @@ class Finding:
     sigma: float = float("nan")
     candidates: tuple[str, ...] = ()
     tolerable: bool = False
+    state: str = ""
 
     @property
     def light(self) -> Light:
@@ -111,9 +113,10 @@ class CameraCheck:
     """One camera: its tests, its residuals, and what the tests could have seen.
 
     ``pose_statistic`` (6 dof) and ``lens_statistic`` (f, cx, cy: 3 dof) before anything was found
-    and accounted for, with ``*_limit`` from where they alarm. ``effect_px``, ``effect_mm`` of the
-    movement that the pose test estimates. ``verdict``: fine, camera-moved, lens-changed or
-    cannot-tell, and ``reason`` for the last. ``grid``: residuals over the image.
+    and accounted for, with ``*_limit`` from where they alarm. ``effect_px``, ``effect_mm`` of what
+    was found of the camera, as its finding has them (``effect_mm`` of all cameras that share it);
+    else of the likeliest movement. ``verdict``: fine, camera-moved, lens-changed or cannot-tell,
+    and ``reason`` for the last. ``grid``: residuals over the image.
     """
 
     name: str

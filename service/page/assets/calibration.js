@@ -113,6 +113,6 @@ async function checked(job, signal) {
     result.findings.length ? table("What was found", ["", "Whose", "At the subject"], result.findings.map((one) =>
       [h("span", { class: `state ${{ green: "good", yellow: "warn", red: "bad" }[one.light]}` }, one.kind), one.subjects.join(", "), number(one.effect_mm === null ? null : 1000 * one.effect_mm, "µm")])) : null,
     table("Cameras", ["Camera", "Verdict", "Points", "Fit", "Could hide"], result.cameras.map((camera) =>
-      [camera.name, camera.verdict, camera.points, number(camera.rms_px, "px"), number(camera.hidden_mm === null ? null : 1000 * camera.hidden_mm, "µm", 2)])),
+      [camera.name, camera.reason ? `${camera.verdict} (${camera.reason})` : camera.verdict, camera.points, number(camera.rms_px, "px"), number(camera.hidden_mm === null ? null : 1000 * camera.hidden_mm, "µm", 2)])),
     frame("Report", `${job.links.self}/report`), await files(job, signal)];
 }
