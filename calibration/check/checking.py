@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,10 +10,15 @@ import numpy as np
 from calibration.adjustment.result import Calibration
 from calibration.check import messages as words
 from calibration.check.changes import changes, effect_of_mm
-from calibration.check.condition import LEAST_POINTS, condition_of
+from calibration.check.condition import (
+    LEAST_POINTS,
+    condition_of,
+    is_mirrored,
+    unexplained,
+)
 from calibration.check.diagnosis import Diagnosis, diagnose
 from calibration.check.effects import effects
-from calibration.check.epoch import Epoch, epoch_of
+from calibration.check.epoch import Epoch, epoch_of, require_known
 from calibration.check.findings import findings, scale_estimate
 from calibration.check.gross import Corrected, corrected_epoch
 from calibration.check.hypotheses import ALPHA, Cause
@@ -28,6 +34,7 @@ from calibration.check.tables import (
 )
 from calibration.check.verdicts import STOPPING, CameraCheck, CheckResult, Finding, Kind, Light
 from calibration.defaults import HIDDEN_LIMIT_MM, TOLERANCE_MM
+from calibration.detection.detections import PictureProblem
 from calibration.observations import Observations
 from common.errors import InputError
 from common.progress import (
@@ -71,15 +78,20 @@ def check(
     options: CheckOptions | None = None,
     progress: ProgressCallback = ignore_progress,
     cancel: CancelToken | None = None,
+    problems: Mapping[str, PictureProblem] | None = None,
 ) -> CheckResult:
     """What changed since the reference was made: which camera, lens, target; or nothing.
+
+    ``problems``: cameras whose pictures could not be used, and why, as detection told.
 
     Raises :class:`InputError` when the observations are not of the reference's rig and targets,
     and :class:`CancelledError`.
     """
     cancel = cancel or NeverCancelled()
     progress(Progress("reading", 0.0))
-    condition = condition_of(reference, observations)
+    problems = problems or {}
+    require_known(reference, (*observations.cameras, *problems))
+    condition = condition_of(reference, observations, problems)
     if not condition.keep.all():
         observations = observations.subset(np.flatnonzero(condition.keep))
     epoch = epoch_of(reference, observations)
@@ -91,6 +103,9 @@ def check(
     diagnosis = diagnose(corrected.epoch, corrected.start.state, corrected.suspects)
     go_on(cancel)
     progress(Progress("verdict", 0.9))
+    # Codes that are read in a mirror are read by chance: nothing else follows from them.
+    seen = {epoch.camera_names[int(k)] for k in np.unique(epoch.camera)}
+    readable = not any(is_mirrored(f) and seen <= set(f.subjects) for f in corrected.pictures)
     return judge(
         reference,
         observations,
@@ -98,8 +113,8 @@ def check(
         corrected,
         diagnosis,
         options or CheckOptions(),
-        (*condition.findings, *corrected.pictures),
-        condition.checkable,
+        (*unexplained(condition.findings, corrected.pictures), *corrected.pictures),
+        condition.checkable and readable,
     )
 
 

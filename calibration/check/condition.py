@@ -12,10 +12,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from calibration.adjustment.camera import CalibratedCamera
+from calibration.adjustment.initialisation.views import Placements
 from calibration.adjustment.result import Calibration
 from calibration.check import messages
 from calibration.check.verdicts import Finding, Kind
+from calibration.detection.detections import PictureProblem
+from calibration.detection.unseen import MIRRORED, UNPAIRED
 from calibration.observations import Observations
+from common.errors import InputError
 from geometry.arrays import Bools, Floats
 
 LEAST_POINTS = 8
@@ -50,19 +54,28 @@ class Condition:
         return frozenset(name for f in self.findings for name in f.subjects)
 
 
-def condition_of(reference: Calibration, observations: Observations) -> Condition:
-    """The state of each camera's pictures against the reference's."""
+def condition_of(
+    reference: Calibration,
+    observations: Observations,
+    problems: Mapping[str, PictureProblem] | None = None,
+) -> Condition:
+    """The state of each camera's pictures against the reference's.
+
+    ``problems``: cameras whose pictures could not be used, and why.
+
+    Raises :class:`InputError` when no two cameras see a carrier in one place.
+    """
+    told = dict(problems or {})
+    found = [_unusable(c.name, told[c.name]) for c in reference.cameras if c.name in told]
     keep = np.ones(len(observations.pixel), bool)
     index = {name: k for k, name in enumerate(observations.cameras)}
     counts = np.bincount(observations.camera, minlength=len(observations.cameras))
     points = np.array([counts[index[c.name]] if c.name in index else 0 for c in reference.cameras])
-    found: list[Finding] = []
-    gone = tuple(c.name for c, n in zip(reference.cameras, points, strict=True) if n == 0)
+    named = tuple(zip((c.name for c in reference.cameras), points, strict=True))
+    gone = tuple(name for name, n in named if n == 0 and name not in told)
     if gone:
         found.append(Finding(Kind.CAMERA_MISSING, gone, messages.missing(gone)))
-    few = tuple(
-        c.name for c, n in zip(reference.cameras, points, strict=True) if 0 < n < LEAST_POINTS
-    )
+    few = tuple(name for name, n in named if 0 < n < LEAST_POINTS)
     if few:
         found.append(Finding(Kind.CANNOT_TELL, few, messages.few(few, LEAST_POINTS)))
         keep &= ~np.isin(observations.camera, [index[name] for name in few])
@@ -80,11 +93,71 @@ def condition_of(reference: Calibration, observations: Observations) -> Conditio
             keep &= ~soft
     blamed = {name for f in found for name in f.subjects}
     found += [f for f in _half_blind(reference, points) if not blamed & set(f.subjects)]
+    return _tied(observations, found, keep)
+
+
+def _unusable(camera: str, problem: PictureProblem) -> Finding:
+    """What detection told of a camera, as a finding."""
+    if problem.code == MIRRORED:
+        return Finding(Kind.LENS_CHANGED, (camera,), messages.mirrored(camera), value=-1.0)
+    if problem.code == UNPAIRED:
+        sentence = messages.unpaired(problem.problem, problem.remedy)
+        return Finding(Kind.UNSYNCHRONISED, (camera,), sentence)
+    sentence = messages.unseeing(camera, problem.problem, problem.remedy)
+    return Finding(Kind.CAMERA_MISSING, (camera,), sentence)
+
+
+def _tied(observations: Observations, found: list[Finding], keep: Bools) -> Condition:
+    """The condition without cameras that nothing ties to the others."""
+    alone = _alone(observations, keep, LEAST_POINTS)
+    kept = keep & ~np.isin(observations.camera, list(alone))
     # What is left must still be a check: two cameras at the least.
-    checkable = len(np.unique(observations.camera[keep])) >= LEAST_CAMERAS
+    checkable = len(np.unique(observations.camera[kept])) >= LEAST_CAMERAS
     if not checkable:
-        keep[:] = True
-    return Condition(tuple(found), keep, checkable)
+        alone = _alone(observations, np.ones_like(keep), 1)
+        kept = ~np.isin(observations.camera, list(alone))
+    if len(observations.pixel) and not kept.any() and len(alone) >= LEAST_CAMERAS:
+        raise InputError(
+            "check-alone",
+            "no two cameras see a carrier at the same time",
+            "give pictures of one instant one name, and show the targets to two cameras at once",
+        )
+    blamed = {name for f in found if f.kind is not Kind.TARGETS_LOST for name in f.subjects}
+    names = tuple(observations.cameras[k] for k in sorted(alone))
+    names = tuple(name for name in names if name not in blamed)
+    if names:
+        found = [Finding(Kind.CANNOT_TELL, names, messages.alone(names)), *found]
+    return Condition(tuple(found), kept, checkable)
+
+
+def _alone(observations: Observations, keep: Bools, least: int) -> set[int]:
+    """Cameras that see less than ``least`` targets of carriers that another sees as they stand.
+
+    Their places would follow them wherever they moved: no test could tell.
+    """
+    place, out = Placements.of(observations).of_row, set[int]()
+    while True:
+        rows = keep & ~np.isin(observations.camera, list(out))
+        seen = np.unique(np.stack([place[rows], observations.camera[rows]]), axis=1)
+        shared = np.isin(place, np.flatnonzero(np.bincount(seen[0]) >= LEAST_CAMERAS)) & rows
+        cameras = np.unique(observations.camera[rows])
+        more = {int(k) for k in cameras if (observations.camera[shared] == k).sum() < least}
+        if not more:
+            return out
+        out |= more
+
+
+def unexplained(before: tuple[Finding, ...], pictures: tuple[Finding, ...]) -> tuple[Finding, ...]:
+    """What was told before, without what follows from mirrored ``pictures``: targets not read."""
+    flipped = {name for f in pictures if is_mirrored(f) for name in f.subjects}
+    return tuple(
+        f for f in before if f.kind is not Kind.TARGETS_LOST or not flipped & set(f.subjects)
+    )
+
+
+def is_mirrored(finding: Finding) -> bool:
+    """Whether a finding says that pictures are mirrored."""
+    return finding.kind is Kind.LENS_CHANGED and finding.value == -1.0
 
 
 def _other_size(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -121,16 +122,22 @@ def epoch_of(calibration: Calibration, observations: Observations) -> Epoch:
     )
 
 
-def _cameras(calibration: Calibration, observations: Observations) -> Ints:
-    """The reference's index of each camera."""
-    known = {c.name: k for k, c in enumerate(calibration.cameras)}
-    strange = [name for name in observations.cameras if name not in known]
+def require_known(calibration: Calibration, cameras: Iterable[str]) -> None:
+    """Raises :class:`InputError` when a camera is not the reference's."""
+    known = [c.name for c in calibration.cameras]
+    strange = [name for name in cameras if name not in known]
     if strange:
         raise InputError(
             "check-camera-unknown",
             f"camera {strange[0]!r} is not in the reference; it has {', '.join(known)}",
             "name the cameras as in the reference, or calibrate anew",
         )
+
+
+def _cameras(calibration: Calibration, observations: Observations) -> Ints:
+    """The reference's index of each camera."""
+    require_known(calibration, observations.cameras)
+    known = {c.name: k for k, c in enumerate(calibration.cameras)}
     used = np.unique(observations.camera)
     if len(used) < LEAST_CAMERAS:
         raise InputError(

@@ -42,6 +42,28 @@ def missing(cameras: tuple[str, ...]) -> str:
     )
 
 
+def unseeing(camera: str, problem: str, remedy: str) -> str:
+    """A camera in whose pictures nothing can be read, and why."""
+    own = problem.removeprefix("it ")
+    told = f"{own}" if own != problem else f"shows no target: {problem}"
+    return f"Camera {camera} {told}; {remedy}, then check again."
+
+
+def unpaired(problem: str, remedy: str) -> str:
+    """A camera whose pictures belong to no frame of the others."""
+    return f"{problem[0].upper()}{problem[1:]}; {remedy}, then check again."
+
+
+def alone(cameras: tuple[str, ...]) -> str:
+    """Cameras that see nothing that another sees at the same time."""
+    see = "sees" if len(cameras) == 1 else "see"
+    return (
+        f"Nothing can be said of {joined(cameras)}, which {see} hardly a target of a carrier that "
+        "another camera sees at the same time: give pictures of one instant one name, and show "
+        "the targets to two cameras at once."
+    )
+
+
 def blurred(camera: str, now_px: float, before_px: float) -> str:
     """A camera is out of focus."""
     return (

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from calibration.detection.boarddiagnosis import (
     grid_layout,
 )
 from calibration.detection.detections import PictureProblem
+from calibration.detection.exposure import unreadable
 from calibration.detection.gates import Gates
 from calibration.detection.images import Picture
 from calibration.detection.opencv import Markers
@@ -39,6 +40,12 @@ _ENOUGH_MARKERS = 4
 _MOST_COLUMNS = 30
 _BACK = "; or, where it is the back of a plate, give back_mm, the plate's thickness"
 _SIZE_SHARE, _SIZE_PX = 0.05, 3.0
+MIRRORED_SHARE = 0.05
+"""Share of a set's codes that a mirror must show, and four of them, or a third of a small set's: a
+few are read by chance."""
+
+_Question = Callable[[Mapping[bool, MarkerSearch], TargetPlan, Gates, int], PictureProblem | None]
+
 FEW = 8
 """Some codes look the same in a mirror: a few targets can be found in a mirrored picture."""
 
@@ -66,7 +73,10 @@ def diagnose(
     ]
     if findings or found > FEW:
         return tuple(findings)
-    questions = (_mirrored,) if found else (_mirrored, _boards, _inverted, _other_dictionary)
+    if found:
+        questions: tuple[_Question, ...] = (_mirrored,)
+    else:
+        questions = (_mirrored, _boards, _inverted, _other_dictionary, _light)
     for question in questions:
         answer = question(sights, plan, gates, found)
         if answer is not None:
@@ -187,7 +197,9 @@ def _mirrored(
         count += _known_markers(side.mirrored, one_sided, inverted)
         mine = [c for c in rings if c.inverted == inverted]
         count += mirrored_codes(side, ring_dots(side, gates), mine) if mine else 0
-    if count < max(2.0, 0.5 * found):
+    codes = sum(len(marker_numbers(c)) for c in one_sided) + sum(len(c.ids) for c in rings)
+    by_chance = max(min(_ENOUGH_MARKERS, codes / 3.0), MIRRORED_SHARE * codes)
+    if count < max(2.0, by_chance, 0.5 * found):
         return None
     return PictureProblem(
         "mirrored",
@@ -210,6 +222,14 @@ def _inverted(
                 f"set inverted = {str(not inverted).lower()} in the target file",
             )
     return None
+
+
+def _light(
+    sights: Mapping[bool, MarkerSearch], plan: TargetPlan, gates: Gates, found: int
+) -> PictureProblem | None:
+    del plan, gates, found
+    inverted, sight = next(iter(sights.items()))
+    return unreadable(sight.picture.negative if inverted else sight.picture)
 
 
 def _known_markers(picture: Picture, carriers: Sequence[CarrierKind], inverted: bool) -> int:
@@ -241,7 +261,9 @@ def _other_dictionary(
         if name not in mine
     }
     name = max(counts, key=lambda n: (counts[n], -opencv.dictionary_size(n)))
-    if counts[name] < _ENOUGH_MARKERS:
+    # Small dictionaries are the beginnings of larger ones: their own markers are read in both.
+    own = sum(_known_markers(sight.picture, carriers, side) for side, sight in sights.items())
+    if counts[name] < max(_ENOUGH_MARKERS, 2 * own):
         return None
     return PictureProblem(
         "dictionary",

@@ -205,6 +205,11 @@ def reduced(grey: Bytes, factor: int) -> Bytes:
     )
 
 
+def smoothed(grey: Bytes) -> Floats:
+    """The mean of each pixel and its eight neighbours, (H, W)."""
+    return np.asarray(cv2.blur(grey.astype(np.float64), (3, 3)))
+
+
 def to_grey(image: AnyImage, order: str) -> AnyImage:
     """A colour picture (H, W, 3 or 4), ``order`` RGB or BGR, as grey (H, W) of the same depth."""
     alpha = "A" if image.shape[2] == 4 else ""

@@ -3,20 +3,28 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor, Future
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
 from calibration.detection.detections import Detections, PictureProblem
-from calibration.detection.diagnosis import FEW
 from calibration.detection.finding import find_targets
 from calibration.detection.gates import Gates, Rule
 from calibration.detection.images import read_picture
 from calibration.detection.opencv import AnyImage
 from calibration.detection.selftest import require_opencv
+from calibration.detection.unseen import (
+    LEAST,
+    MIRRORED,
+    UNPAIRED,
+    LeaveOut,
+    Look,
+    unpaired,
+    unseeing,
+)
 from calibration.observations import Observations
 from calibration.targets.kinds import TargetPlan
 from common.errors import InputError
@@ -30,8 +38,6 @@ from common.progress import (
 )
 
 _POLL_S = 0.1
-_EXPLAINED = 3
-_LEAST_STRAIGHT = 2
 _MISPLACED = (Rule.FIT, Rule.HOMOGRAPHY, Rule.POSE)
 _MANY = 0.2
 """Share of targets that is worth a sentence when it is lost."""
@@ -63,13 +69,19 @@ class TakenPicture:
 class DetectedPictures:
     """What was found: ``detections`` belong to ``pictures``, one each, in order.
 
-    ``left_out``: a sentence for each camera that is not among the observations.
+    ``problems``: the cameras of which no observation is used, and why.
     """
 
     observations: Observations
     pictures: tuple[TakenPicture, ...]
     detections: tuple[Detections, ...]
-    left_out: tuple[str, ...] = ()
+    problems: Mapping[str, PictureProblem] = field(default_factory=dict)
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """A sentence for each camera that sees the targets in a mirror only."""
+        found = (name for name, problem in self.problems.items() if problem.code == MIRRORED)
+        return tuple(_MIRRORED.format(camera=name) for name in found)
 
     def counts(self) -> dict[str, int]:
         """Targets found by each camera in all its pictures."""
@@ -126,21 +138,25 @@ def detect_pictures(
     progress: ProgressCallback = ignore_progress,
     cancel: CancelToken | None = None,
     executor: Executor | None = None,
-    leave_mirrored: bool = False,
+    leave_out: LeaveOut = LeaveOut.NONE,
 ) -> DetectedPictures:
     """Targets in all pictures. Cameras and frames keep the order in which they first come.
 
     Work goes to ``executor`` when there is one (jobs and results can be pickled), else it is
-    done here. ``leave_mirrored``: a camera that sees the targets in a mirror only is left out, as
-    long as two others see them as they are.
+    done here. ``leave_out``: which cameras are left out and told where their pictures cannot be
+    used, as long as two others are left.
 
     Raises :class:`CancelledError`, and one-line :class:`InputError` for: no pictures,
     two of one camera and frame, a picture that cannot be read, pictures of one camera in
-    different sizes, and a camera that saw no target at all, with the reason where it is known.
+    different sizes, and a camera that is not left out though it shares no name of a picture with
+    another or saw no target at all, with the reason where it is known.
     Raises :class:`DeviceError` when this OpenCV measures wrongly.
     """
     gates = Gates() if gates is None else gates
     _check_list(pictures)
+    problems = _unpaired(pictures)
+    if not any(carrier.fixed for carrier in plan.target_set().carriers):
+        _refuse(pictures, problems, leave_out)
     require_opencv()
     jobs = [DetectionJob(picture, plan, gates) for picture in pictures]
     found: list[Detections] = []
@@ -148,15 +164,16 @@ def detect_pictures(
         _check_size(pictures, found, result)
         found.append(result)
         progress(Progress("finding targets", number / len(jobs), iteration=number))
-    mirrored = _check_seen(jobs, found)
-    straight = len({p.camera for p in pictures}) - len(mirrored)
-    if mirrored and not (leave_mirrored and straight >= _LEAST_STRAIGHT):
-        camera, finding = next(iter(mirrored.items()))
-        raise finding.error(f"camera {camera}")
-    rows = [k for k, picture in enumerate(pictures) if picture.camera not in mirrored]
+    problems = _moving(problems, pictures, found, plan)
+    looks = [
+        Look(p.camera, d, replace(j, explain=True))
+        for p, d, j in zip(pictures, found, jobs, strict=True)
+    ]
+    problems = unseeing(looks, plan) | problems
+    _refuse(pictures, problems, leave_out)
+    rows = [k for k, p in enumerate(pictures) if p.camera not in problems]
     observations = _observations([pictures[k] for k in rows], [found[k] for k in rows], plan)
-    left_out = tuple(_MIRRORED.format(camera=camera) for camera in mirrored)
-    return DetectedPictures(observations, tuple(pictures), tuple(found), left_out)
+    return DetectedPictures(observations, tuple(pictures), tuple(found), problems)
 
 
 def _results(
@@ -216,54 +233,35 @@ def _text(found: Detections) -> str:
     return "{} x {}".format(*found.image_size_px)
 
 
-def _check_seen(
-    jobs: Sequence[DetectionJob], found: Sequence[Detections]
+def _unpaired(pictures: Sequence[TakenPicture]) -> dict[str, PictureProblem]:
+    cameras = dict.fromkeys(p.camera for p in pictures)
+    return unpaired({c: frozenset(p.frame for p in pictures if p.camera == c) for c in cameras})
+
+
+def _moving(
+    problems: Mapping[str, PictureProblem],
+    pictures: Sequence[TakenPicture],
+    found: Sequence[Detections],
+    plan: TargetPlan,
 ) -> dict[str, PictureProblem]:
-    """Every camera must have seen something; the one that has not is asked why.
+    """The problems of cameras that see what moves: what stands still needs no pairs."""
+    ids = {i for c in plan.target_set().carriers if not c.fixed for i in c.ids}
+    see = {p.camera for p, d in zip(pictures, found, strict=True) if not ids.isdisjoint(d.ids)}
+    return {camera: problem for camera, problem in problems.items() if camera in see}
 
-    Returns the cameras that see everything in a mirror.
-    """
-    mirrored: dict[str, PictureProblem] = {}
-    cameras = dict.fromkeys(job.picture.camera for job in jobs)
-    for camera in cameras:
-        mine = [k for k, job in enumerate(jobs) if job.picture.camera == camera]
-        best = max(mine, key=lambda k: len(found[k]))
-        if len(found[best]):
-            finding = _mirrored(jobs[best], len(found[best]))
-            if finding is not None:
-                mirrored[camera] = finding
+
+def _refuse(
+    pictures: Sequence[TakenPicture], problems: Mapping[str, PictureProblem], leave_out: LeaveOut
+) -> None:
+    """Raises for the first camera that cannot be left out."""
+    cameras = dict.fromkeys(p.camera for p in pictures)
+    enough = len(cameras) - len(problems) >= LEAST
+    for camera, problem in problems.items():
+        if enough and leave_out.leaves(problem):
             continue
-        # A picture with rejections shows more than one without, and explains better.
-        for k in sorted(mine, key=lambda k: -len(found[k].rejections))[:_EXPLAINED]:
-            explained = replace(jobs[k], explain=True)()
-            if explained.findings and explained.findings[0].code == "mirrored":
-                mirrored[camera] = explained.findings[0]
-                break
-            if explained.findings:
-                raise explained.findings[0].error(f"camera {camera}")
-        if camera in mirrored:
-            continue
-        rejected = Counter(r.rule.value for k in mine for r in found[k].rejections)
-        seen = ""
-        if rejected:
-            rule = rejected.most_common(1)[0][0]
-            seen = f"; {sum(rejected.values())} were rejected, most by rule {rule}"
-        raise InputError(
-            "targets-none",
-            f"camera {camera} shows no target of set {jobs[0].plan.name!r} in its {len(mine)} "
-            f"pictures{seen}",
-            "check that the targets are in view, sharp and well lit, and that the target file "
-            "is theirs",
-        )
-    return mirrored
-
-
-def _mirrored(job: DetectionJob, found: int) -> PictureProblem | None:
-    """Few targets in a camera's best picture may be those that look the same in a mirror."""
-    if found > min(FEW, len(job.plan.target_set().ids) // 2):
-        return None
-    findings = replace(job, explain=True)().findings
-    return next((finding for finding in findings if finding.code == "mirrored"), None)
+        if problem.code == UNPAIRED:
+            raise InputError("pictures-unpaired", problem.problem, problem.remedy)
+        raise problem.error(f"camera {camera}")
 
 
 def _observations(

@@ -15,6 +15,7 @@ from calibration.acceptance.certificate import Heading
 from calibration.adjustment import CalibratedCamera, CalibrationOptions, ReferencePoses, calibrate
 from calibration.adjustment.options import FIXED, FREE, InteriorModel
 from calibration.check import CheckOptions, check
+from calibration.detection.unseen import LeaveOut
 from calibration.files import (
     ACCEPTANCES,
     CHECKS,
@@ -51,7 +52,13 @@ def calibration(
     """Calibrate all cameras; writes ``calibration.json``, ``report.html``, ``detections.json``."""
     plan = read_targets(task.inputs["targets"])
     views: list[DetectionView] = []
-    seen = see(plan, task, running, lambda found: views.extend(detection_views(found)), True)
+    seen = see(
+        plan,
+        task,
+        running,
+        lambda found: views.extend(detection_views(found)),
+        LeaveOut.MIRRORED,
+    )
     options = options_of(task.request, task.inputs)
     done = calibrate(seen.observations, options, _after(running.report), running.cancel)
     warnings = (*seen.left_out, *seen.thrown_out(), *done.quality.warnings)
@@ -89,11 +96,13 @@ def rig_check(task: Task[CheckRequest, CheckOutcome], running: Running) -> Check
     """
     told = read_calibration(task.inputs["calibration"])
     reference, name = told.calibration, _name(task.run, task.inputs, told)
-    seen = see(read_targets(task.inputs["targets"]), task, running)
+    plan = read_targets(task.inputs["targets"])
+    seen = see(plan, task, running, leave_out=LeaveOut.ALL)
     options = CheckOptions(
         hidden_limit_mm=task.request.hidden_limit_mm, tolerance_mm=task.request.tolerance_mm
     )
-    result = check(reference, seen.observations, options, _after(running.report), running.cancel)
+    report, cancel = _after(running.report), running.cancel
+    result = check(reference, seen.observations, options, report, cancel, seen.problems)
     record = CheckRecord(name, task.run.made_utc, result)
     CHECKS.write(task.folder / "check.json", record)
     earlier = [CHECKS.read(path) for role, path in task.inputs.items() if role.startswith("check-")]

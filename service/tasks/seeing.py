@@ -14,6 +14,7 @@ from pathlib import Path
 from calibration.detection.gates import Rejection
 from calibration.detection.pictures import DetectedPictures, TakenPicture, detect_pictures
 from calibration.detection.selftest import require_opencv
+from calibration.detection.unseen import LeaveOut
 from calibration.targets.kinds import TargetPlan
 from common.files.plain import plain
 from common.progress import Progress, within
@@ -35,11 +36,11 @@ def see(
     task: Task[RequestT, ResultT],
     running: Running,
     look: Callable[[DetectedPictures], None] | None = None,
-    leave_mirrored: bool = False,
+    leave_out: LeaveOut = LeaveOut.NONE,
 ) -> DetectedPictures:
     """The targets of ``plan`` in the pictures that a task was given.
 
-    ``leave_mirrored``: without the cameras that see them in a mirror only.
+    ``leave_out``: without the cameras whose pictures cannot be used in such a way.
 
     ``look`` is called while the pictures are still there: those of an archive are unpacked for
     as long as this takes.
@@ -59,7 +60,7 @@ def see(
                 progress=within(running.report, 0.0, DETECTING),
                 cancel=running.cancel,
                 executor=executor,
-                leave_mirrored=leave_mirrored,
+                leave_out=leave_out,
             )
         if look is not None:
             look(seen)

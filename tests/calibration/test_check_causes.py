@@ -13,7 +13,9 @@ from synthetic_scenes import Scene
 from calibration.adjustment import Calibration
 from calibration.adjustment.rotations import rotation_of
 from calibration.check import CheckResult, Kind, Light, check
+from calibration.detection.detections import PictureProblem
 from calibration.observations import Observations
+from common.errors import InputError
 from geometry.arrays import Floats
 from geometry.frames import Pose
 
@@ -214,3 +216,93 @@ def test_all_lenses_changed_alike(share: float) -> None:
     assert result.kinds == (Kind.LENS_CHANGED,), result.sentence
     assert "focal lengths of all cameras" in result.sentence
     assert result.findings[0].value == pytest.approx(share, rel=0.2)
+
+
+def without_pairs(observations: Observations, cameras: tuple[int, ...]) -> Observations:
+    """Each of some cameras with frames of its own, and without what stands still."""
+    frames = list(observations.frames)
+    frame = observations.frame.copy()
+    for k in cameras:
+        own = observations.camera == k
+        frame[own] += len(frames)
+        frames += [f"{k}-{name}" for name in observations.frames]
+    still = [c.fixed for c in observations.targets.carriers]
+    there = np.array(still)[observations.targets.carrier_of[observations.target]]
+    rows = np.flatnonzero(~(there & np.isin(observations.camera, cameras)))
+    return replace(observations, frames=tuple(frames), frame=frame).subset(rows)
+
+
+def test_a_camera_that_nothing_ties_to_the_others_is_named_and_they_are_checked() -> None:
+    moved = calibrations.disturbed(SCENE, 0, np.array([0.3, 0.1, 0.0]))
+    result = checked(without_pairs(seen(moved), (1,)))
+    # Without the stand it sees few targets, too.
+    assert result.kinds == (Kind.CANNOT_TELL, Kind.TARGETS_LOST, Kind.CAMERA_MOVED)
+    assert [f.subjects for f in result.findings] == [("cam2",), ("cam2",), ("cam1",)]
+    assert "give pictures of one instant one name" in result.sentence
+
+
+def test_a_check_of_few_targets_alone_is_no_check_of_other_instants() -> None:
+    observations = seen()
+    one = observations.frame == observations.frame[0]
+    rows = [np.flatnonzero(one & (observations.camera == k))[:4] for k in range(5)]
+    result = checked(observations.subset(np.concatenate(rows)))
+    assert result.kinds == (Kind.CANNOT_TELL,), result.sentence
+    assert "too few targets" in result.sentence
+
+
+def test_cameras_of_which_no_two_see_one_thing_are_refused() -> None:
+    observations = without_pairs(seen(), (0, 1, 2, 3, 4))
+    with pytest.raises(InputError, match="no two cameras see a carrier at the same time"):
+        checked(observations)
+
+
+@pytest.mark.parametrize(
+    ("code", "kind", "words"),
+    [
+        ("dark", Kind.CAMERA_MISSING, "Camera cam3 shows no target: the picture is too dark; see"),
+        ("none", Kind.CAMERA_MISSING, "Camera cam3 shows no target of set 'x' in its 4 pictures;"),
+        ("unpaired", Kind.UNSYNCHRONISED, "No picture of cam3 has the name"),
+        ("mirrored", Kind.LENS_CHANGED, "The images of camera cam3 are mirrored"),
+    ],
+)
+def test_what_detection_told_of_a_camera_is_told_first(code: str, kind: Kind, words: str) -> None:
+    problem = {
+        "none": "it shows no target of set 'x' in its 4 pictures",
+        "unpaired": "no picture of cam3 has the name of another camera's picture",
+    }.get(code, f"the picture is too {code}")
+    observations = seen()
+    names = tuple(n for n in observations.cameras if n != "cam3")
+    rows = np.flatnonzero(observations.camera != 2)
+    left = observations.subset(rows)
+    camera = np.where(left.camera > 2, left.camera - 1, left.camera)
+    sizes = np.delete(left.image_size_px, 2, axis=0)
+    left = replace(left, cameras=names, camera=camera, image_size_px=sizes)
+    problems = {"cam3": PictureProblem(code, problem, "see its light")}
+    result = check(calibrations.small_reference(), left, problems=problems)
+    first(result, kind, {"cam3"}, words, Light.RED)
+    assert all(c.verdict is Kind.FINE for c in result.cameras if c.name != "cam3")
+    strange = {"cam9": problems["cam3"]}
+    with pytest.raises(InputError, match="camera 'cam9' is not in the reference"):
+        check(calibrations.small_reference(), left, problems=strange)
+
+
+def test_few_targets_in_mirrored_pictures_are_no_story_of_their_own() -> None:
+    observations = with_pixels(2, GROSS["mirrored"][0])
+    own = np.flatnonzero(observations.camera == 2)
+    rows = np.sort(np.r_[np.flatnonzero(observations.camera != 2), own[::4]])
+    result = checked(observations.subset(rows))
+    first(result, Kind.LENS_CHANGED, {"cam3"}, "mirrored", Light.RED)
+
+
+def test_ids_that_are_read_in_a_mirror_are_no_story_of_their_own() -> None:
+    """All pictures are mirrored, and two targets are taken for each other as the codes are."""
+    observations = seen()
+    width = int(observations.image_size_px[0][0])
+    pixel = observations.pixel * [-1.0, 1.0] + [width - 1.0, 0.0]
+    plate = observations.targets.carrier_of == 1
+    one, two = np.flatnonzero(plate)[:2]
+    target = observations.target.copy()
+    target[observations.target == one], target[observations.target == two] = two, one
+    result = checked(replace(observations, pixel=pixel, target=target))
+    names = {c.name for c in SCENE.cameras}
+    first(result, Kind.LENS_CHANGED, names, "all cameras are mirrored", Light.RED)

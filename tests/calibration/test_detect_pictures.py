@@ -6,18 +6,21 @@ import dataclasses
 import io
 import pickle
 import threading
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 import pytest
 import target_scenes as scenes
-from PIL import Image
+from PIL import Image, ImageFilter
 
 from calibration.detection.finding import find_targets
 from calibration.detection.gates import Gates, Rejection, Rule
 from calibration.detection.images import decoded, picture_from, read_picture
+from calibration.detection.opencv import detect_markers
 from calibration.detection.pictures import DetectionJob, TakenPicture, detect_pictures
+from calibration.detection.unseen import LeaveOut
 from calibration.targets.kinds import TargetPlan
 from common.errors import CancelledError, InputError
 from common.progress import Progress
@@ -131,7 +134,7 @@ def test_lists_that_cannot_be_are_refused(image: np.ndarray) -> None:
         ),
         (
             [one, TakenPicture("right", "1", np.full((64, 64), 90, np.uint8))],
-            "camera right shows no target of set 'set' in its 1 pictures",
+            "camera right: it shows no target of set 'set' in its 1 pictures",
         ),
         (
             [TakenPicture("left", "1", np.ascontiguousarray(image[:, ::-1]))],
@@ -155,7 +158,7 @@ def test_a_camera_that_sees_a_mirror_image_is_left_out_and_told(
     other = np.ascontiguousarray(image[flip])
     pictures = [TakenPicture(camera, "1", image) for camera in ("left", "right")]
     pictures.insert(1, TakenPicture("behind", "1", other))
-    found = detect_pictures(pictures, PLAN, leave_mirrored=True)
+    found = detect_pictures(pictures, PLAN, leave_out=LeaveOut.MIRRORED)
     assert found.observations.cameras == ("left", "right")
     assert found.counts() == {"left": 12, "behind": 0, "right": 12}
     (sentence,) = found.left_out
@@ -165,7 +168,7 @@ def test_a_camera_that_sees_a_mirror_image_is_left_out_and_told(
         detect_pictures(pictures, PLAN)
     # One camera alone that sees them as they are says nothing about which is right.
     with pytest.raises(InputError, match="camera behind: the picture is mirrored"):
-        detect_pictures(pictures[:2], PLAN, leave_mirrored=True)
+        detect_pictures(pictures[:2], PLAN, leave_out=LeaveOut.MIRRORED)
 
 
 def test_many_targets_out_of_their_places_are_told(image: np.ndarray) -> None:
@@ -177,3 +180,67 @@ def test_many_targets_out_of_their_places_are_told(image: np.ndarray) -> None:
     seen = dataclasses.replace(detect_pictures(pictures, PLAN), detections=(found, some))
     (sentence,) = seen.thrown_out()
     assert sentence.startswith("25% of the targets that right saw were not used")
+
+
+def soft(image: np.ndarray) -> np.ndarray:
+    return np.asarray(Image.fromarray(image).filter(ImageFilter.GaussianBlur(6.0)))
+
+
+def bright(image: np.ndarray) -> np.ndarray:
+    return np.clip(image.astype(int) * 4, 0, 255).astype(np.uint8)
+
+
+BLIND: dict[str, tuple[Callable[[np.ndarray], np.ndarray], str, str]] = {
+    "capped": (lambda v: np.full_like(v, 3), "dark", "lens cap"),
+    "too bright": (bright, "bright", "see its light"),
+    "out of focus": (soft, "soft", "see its focus"),
+    "nothing in view": (lambda v: np.full_like(v, 120), "none", "in view"),
+}
+
+
+@pytest.mark.parametrize("name", BLIND)
+def test_a_camera_that_sees_nothing_is_told_why(image: np.ndarray, name: str) -> None:
+    change, code, remedy = BLIND[name]
+    pictures = [TakenPicture(camera, "1", image) for camera in ("left", "right")]
+    pictures.insert(1, TakenPicture("blind", "1", change(image)))
+    found = detect_pictures(pictures, PLAN, leave_out=LeaveOut.ALL)
+    assert {camera: p.code for camera, p in found.problems.items()} == {"blind": code}
+    assert remedy in found.problems["blind"].remedy
+    assert found.observations.cameras == ("left", "right")
+    assert found.left_out == ()
+    # A calibration needs every camera, and one camera alone is nothing to compare with.
+    for refused, leave_out in ((pictures, LeaveOut.MIRRORED), (pictures[:2], LeaveOut.ALL)):
+        with pytest.raises(InputError, match="camera blind: ") as caught:
+            detect_pictures(refused, PLAN, leave_out=leave_out)
+        assert "\n" not in str(caught.value)
+
+
+def test_two_targets_in_a_mirror_may_be_read_by_chance(image: np.ndarray) -> None:
+    flipped = np.ascontiguousarray(image[:, ::-1])
+    assert [f.code for f in find_targets(flipped, PLAN).findings] == ["mirrored"]
+    corners = detect_markers(image, scenes.PLATE.dictionary).corners_px
+    for marker in corners[2:]:
+        x, y = np.rint(marker.mean(axis=0)).astype(int)
+        flipped[y - 10 : y + 11, 299 - x - 10 : 299 - x + 11] = 128
+    back = np.ascontiguousarray(flipped[:, ::-1])
+    assert len(detect_markers(back, scenes.PLATE.dictionary)) == 2
+    assert find_targets(flipped, PLAN).findings == ()
+
+
+def test_pictures_of_one_instant_must_have_one_name(image: np.ndarray) -> None:
+    def named(**frames: tuple[str, ...]) -> list[TakenPicture]:
+        return [TakenPicture(c, name, image) for c, names in frames.items() for name in names]
+
+    one = named(left=("1", "2"), odd=("A1", "A2"), right=("1", "2"))
+    told = "no picture of odd has the name of another camera's picture.*every camera has 2"
+    with pytest.raises(InputError, match=told):
+        detect_pictures(one, PLAN, leave_out=LeaveOut.MIRRORED)
+    found = detect_pictures(one, PLAN, leave_out=LeaveOut.ALL)
+    assert list(found.problems) == ["odd"]
+    assert found.observations.cameras == ("left", "right")
+    for leave_out in LeaveOut:
+        with pytest.raises(InputError, match=r"no picture of left has the name.*; rename them$"):
+            detect_pictures(named(left=("1",), right=("2", "3")), PLAN, leave_out=leave_out)
+    # What stands still needs no pairs.
+    still = TargetPlan("set", (dataclasses.replace(scenes.PLATE, fixed=True),))
+    assert not detect_pictures(named(left=("1",), right=("2",)), still).problems

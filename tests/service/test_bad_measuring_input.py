@@ -99,6 +99,19 @@ def loose(folder: Path, pictures: Pictures) -> object:
     return write_pictures(folder, {".": pictures["cam01"]})
 
 
+def own_names(*cameras: str) -> Make:
+    """Pictures of some cameras called by each camera's own counter."""
+
+    def make(folder: Path, pictures: Pictures) -> object:
+        named = {
+            camera: {f"{camera}-{frame}" if camera in cameras else frame: v for frame, v in own}
+            for camera, own in ((c, frames.items()) for c, frames in pictures.items())
+        }
+        return write_pictures(folder, named)
+
+    return make
+
+
 def mirrored(picture: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(picture[:, ::-1])
 
@@ -118,6 +131,7 @@ CASES: dict[str, Case] = {
     "no targets": Case("shows no target", each(lambda v: np.full_like(v, 120))),
     "one camera only": Case("1 camera only", one_camera),
     "all mirrored": Case("camera cam01: the picture is mirrored", each(mirrored)),
+    "one camera's own names": Case("no picture of cam02 has the name", own_names("cam02")),
     "mixed sizes": Case("01.png has 320 x 240 pixels", one(smaller)),
     "columns and rows exchanged": Case(
         "exchange columns and rows",
@@ -300,6 +314,7 @@ CHECKED: dict[str, tuple[str, Make]] = {
     "of another rig": ("'left01' is not in the ", other_names),
     "of another size": ("cam01' has images of 320 x 240 px", each(lambda v: v[:240, :320])),
     "mirrored": ("the picture is mirrored", each(mirrored)),
+    "of own names": ("no picture of cam01 has the name", own_names("cam01", "cam02", "cam03")),
 }
 
 
@@ -318,6 +333,30 @@ def test_pictures_that_are_not_of_the_calibrated_rig(
     request = sent(client, put(tmp_path / "in", Case(words, make), pictures))
     request["calibration_id"] = made[1]["id"]
     assert words in told(problem_of(client, service, f"/v1/{what}", request))
+
+
+BLIND: dict[str, tuple[str, str, Make]] = {
+    "capped": ("camera-missing", "too dark", each(lambda v: np.full_like(v, 3), "cam02")),
+    "of own names": ("unsynchronised", "No picture of cam02 has the name", own_names("cam02")),
+}
+
+
+@pytest.mark.parametrize("name", BLIND)
+def test_a_check_goes_on_without_a_camera_whose_pictures_cannot_be_used(
+    tmp_path: Path, client: TestClient, pictures: Pictures, made: tuple[Path, JSON], name: str
+) -> None:
+    kind, words, make = BLIND[name]
+    request = sent(client, put(tmp_path / "in", Case(words, make), pictures))
+    request["calibration_id"] = made[1]["id"]
+    job = ended(client, client.post("/v1/checks", json=request))
+    assert job["status"] == "completed", job["problem"]
+    result = job["result"]
+    assert result["light"] == "red"
+    first, *others = result["findings"]
+    assert (first["kind"], first["subjects"]) == (kind, ["cam02"])
+    assert words in first["text"]
+    # Two cameras that are left say little of each other, and nothing false.
+    assert {f["kind"] for f in others} <= {"cannot-tell"}
 
 
 @slow
