@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from calibration.adjustment.camera import CalibratedCamera
-from calibration.adjustment.initialisation.views import Placements
+from calibration.adjustment.finite import finite_rows
+from calibration.adjustment.initialisation.views import Placements, spread_rank
 from calibration.adjustment.result import Calibration
 from calibration.check import messages
 from calibration.check.verdicts import Finding, Kind
@@ -20,10 +21,13 @@ from calibration.detection.detections import PictureProblem
 from calibration.detection.unseen import MIRRORED, UNPAIRED
 from calibration.observations import Observations
 from common.errors import InputError
-from geometry.arrays import Bools, Floats
+from geometry.arrays import Bools, Floats, Ints
 
 LEAST_POINTS = 8
 LEAST_CAMERAS = 2
+PLANE = 2
+"""Directions that targets must spread over for one camera to tell how they stand."""
+
 ADDED_PX = 1.0
 """Blur that is added to that of the reference, in squares: less is a day's light and distance."""
 
@@ -127,7 +131,24 @@ def _tied(observations: Observations, found: list[Finding], keep: Bools) -> Cond
     names = tuple(name for name in names if name not in blamed)
     if names:
         found = [Finding(Kind.CANNOT_TELL, names, messages.alone(names)), *found]
-    return Condition(tuple(found), kept, checkable)
+    return Condition(tuple(found), kept & ~_floating(observations, kept), checkable)
+
+
+def _floating(observations: Observations, keep: Bools) -> Bools:
+    """Rows (n,) of bars where one camera alone sees them: nothing tells how they stand."""
+    known = [c.nominal_mm[finite_rows(c.nominal_mm)] for c in observations.targets.carriers]
+    bar = np.array([len(points) > 0 and spread_rank(points) < PLANE for points in known])
+    place = Placements.of(observations).of_row
+    return np.asarray(
+        bar[observations.targets.carrier_of[observations.target]]
+        & ~np.isin(place, _shared(place[keep], observations.camera[keep]))
+    )
+
+
+def _shared(place: Ints, camera: Ints) -> Ints:
+    """The places that two cameras see at least."""
+    seen = np.unique(np.stack([place, camera]), axis=1)
+    return np.flatnonzero(np.bincount(seen[0]) >= LEAST_CAMERAS)
 
 
 def _alone(observations: Observations, keep: Bools, least: int) -> set[int]:
@@ -138,8 +159,7 @@ def _alone(observations: Observations, keep: Bools, least: int) -> set[int]:
     place, out = Placements.of(observations).of_row, set[int]()
     while True:
         rows = keep & ~np.isin(observations.camera, list(out))
-        seen = np.unique(np.stack([place[rows], observations.camera[rows]]), axis=1)
-        shared = np.isin(place, np.flatnonzero(np.bincount(seen[0]) >= LEAST_CAMERAS)) & rows
+        shared = np.isin(place, _shared(place[rows], observations.camera[rows])) & rows
         cameras = np.unique(observations.camera[rows])
         more = {int(k) for k in cameras if (observations.camera[shared] == k).sum() < least}
         if not more:

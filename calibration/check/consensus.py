@@ -103,6 +103,8 @@ _Placed = tuple[float, Floats, Floats]
 def _resected(epoch: Epoch, used: Ints, heard: Floats, place: int) -> _Placed | None:
     """Attitude and position of a carrier that one camera alone saw, by resection."""
     rows = np.flatnonzero(epoch.place == place)
+    if not len(rows):
+        return None
     rows = rows[heard[rows] > 0.0] if (heard[rows] > 0.0).any() else rows
     camera = int(np.bincount(used[rows]).argmax())
     own = rows[used[rows] == camera]

@@ -13,6 +13,7 @@ from synthetic_scenes import Scene
 from calibration.adjustment import Calibration
 from calibration.adjustment.rotations import rotation_of
 from calibration.check import CheckResult, Kind, Light, check
+from calibration.check.condition import condition_of
 from calibration.detection.detections import PictureProblem
 from calibration.observations import Observations
 from common.errors import InputError
@@ -239,6 +240,39 @@ def test_a_camera_that_nothing_ties_to_the_others_is_named_and_they_are_checked(
     assert result.kinds == (Kind.CANNOT_TELL, Kind.TARGETS_LOST, Kind.CAMERA_MOVED)
     assert [f.subjects for f in result.findings] == [("cam2",), ("cam2",), ("cam1",)]
     assert "give pictures of one instant one name" in result.sentence
+
+
+def test_a_bar_that_one_camera_alone_sees_spoils_nothing() -> None:
+    """Three targets of the plate in a line are seen as a bar of their own, at other instants."""
+    observations = seen()
+    plate = observations.targets.carriers[1]
+    away = plate.nominal_mm - plate.nominal_mm[0]
+    along = np.linalg.norm(np.cross(away, away[1]), axis=1) < 1e-6
+    ids = [np.array(plate.ids)[side] for side in (~along, along)]
+    parts = [
+        replace(
+            plate,
+            name=name,
+            ids=tuple(i.tolist()),
+            nominal_mm=plate.nominal_mm[side],
+            sigma_mm=plate.sigma_mm[side],
+        )
+        for name, i, side in zip((plate.name, "bar"), ids, (~along, along), strict=True)
+    ]
+    first_ones, rest = observations.targets.carriers[:1], observations.targets.carriers[2:]
+    targets = replace(observations.targets, carriers=(*first_ones, *parts, *rest))
+    index = {name: k for k, name in enumerate(targets.ids)}
+    target = np.array([index[observations.targets.ids[t]] for t in observations.target])
+    bars = targets.carrier_of[target] == 2
+    condition = condition_of(
+        calibrations.small_reference(),
+        replace(observations, targets=targets, target=target).subset(
+            np.flatnonzero(~bars | (observations.camera == 1))
+        ),
+    )
+    assert bars.any()
+    assert condition.checkable
+    assert (~condition.keep).sum() == (bars & (observations.camera == 1)).sum() > 0
 
 
 def test_a_check_of_few_targets_alone_is_no_check_of_other_instants() -> None:
