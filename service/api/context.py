@@ -28,6 +28,8 @@ from service.stations.worker import WorkerContext
 from service.store import Store
 
 _IMPORTS_AT_ONCE = 2
+STEP_BACK = 10
+"""How much less jobs count than the service, which must go on answering while cores are busy."""
 _SURFACES = (RECONSTRUCTION.name, COMPARISON.name)
 """What grows with the pictures and clouds it is given, which nobody has measured before."""
 
@@ -55,7 +57,7 @@ class Service:
         self.audit = AuditLog(settings.data_dir)
         ring = KeyRing(settings.data_dir, self.store.sign_ins)
         self.keys = ring if settings.asks_for_keys else None
-        self.engine = engine or ProcessEngine(settings.cancel_grace_s)
+        self.engine = engine or ProcessEngine(settings.cancel_grace_s, step_back=STEP_BACK)
         self.notifier = Notifier()
         self.cancels = Cancels(self.store, self.notifier)
         limited = {

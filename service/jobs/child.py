@@ -27,7 +27,6 @@ from service.kinds.base import Result
 FindWork = Callable[[str], Work[Any, Any]]
 """The work of a kind of job by its name: imports what it needs only then."""
 
-_STEP_BACK = 10
 _PROGRESS_INTERVAL_S = 0.2
 _LOADING = Progress("loading the program", 0.0)
 """Told before the imports of a kind of work, which take seconds."""
@@ -57,7 +56,6 @@ def main(find: FindWork) -> int:
     message = TaskMessage(sys.stdin.buffer.readline())
     cancel = threading.Event()
     threading.Thread(target=_obey, args=(cancel,), daemon=True).start()
-    os.nice(_STEP_BACK)  # The service must go on answering while all cores are busy.
     limit = message.memory_limit_bytes
     if limit is not None:
         resource.setrlimit(resource.RLIMIT_AS, (limit, limit))

@@ -31,12 +31,16 @@ class ProcessEngine:
     The numerical libraries' threads are set to one in the environment, before the process
     starts: they read it when they are loaded, and several tasks with a thread per core each
     would slow one another down many times over. ``cancel_grace_s``: how long a task may take to
-    stop by itself before it and everything it started is killed. ``program``: the module that
-    does tasks when it is run.
+    stop by itself before it and everything it started is killed. ``step_back``: how much less
+    tasks count than this process where all cores are busy (niceness). ``program``: the module
+    that does tasks when it is run.
     """
 
-    def __init__(self, cancel_grace_s: float = 0.8, program: str = TASKS_PROGRAM) -> None:
+    def __init__(
+        self, cancel_grace_s: float = 0.8, step_back: int = 0, program: str = TASKS_PROGRAM
+    ) -> None:
         self._cancel_grace_s = cancel_grace_s
+        self._step_back = step_back
         self._program = program
 
     def run(
@@ -47,6 +51,7 @@ class ProcessEngine:
             raise CancelledError
         with (task.folder.parent / f"{task.folder.name}.log").open("w+b") as log_file:
             with _process(self._program, task, log_file) as process:
+                _steps_back(process, self._step_back)
                 outcome = self._listen(process, task, report, cancel)
             _log_output(log_file)
         Path(log_file.name).unlink(missing_ok=True)
@@ -120,6 +125,14 @@ def _process(
             if pipe is not None:
                 with suppress(BrokenPipeError):
                     pipe.close()
+
+
+def _steps_back(process: subprocess.Popen[bytes], by: int) -> None:
+    """Lower a process's priority, and so that of all it will start."""
+    if by:
+        now = os.getpriority(os.PRIO_PROCESS, 0)
+        with suppress(ProcessLookupError):
+            os.setpriority(os.PRIO_PROCESS, process.pid, min(now + by, 19))
 
 
 def _standard_input(process: subprocess.Popen[bytes]) -> IO[bytes]:

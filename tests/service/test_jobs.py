@@ -25,6 +25,7 @@ from sqlalchemy.exc import OperationalError
 
 from common.errors import CancelledError, ConflictError, InputError, InternalError, TooLargeError
 from common.progress import NeverCancelled, Progress, ignore_progress
+from service.api.context import STEP_BACK
 from service.jobs import writing
 from service.jobs.cancels import Cancels
 from service.jobs.engine import Task
@@ -77,8 +78,13 @@ class TestProcessEngine:
 
     def test_it_steps_back_for_the_service(self, tmp_path: Path) -> None:
         """Where Linux shares cores out among sessions first, niceness counts within one only."""
-        nice = min(os.nice(0) + 10, 19)
-        assert misbehave(tmp_path, "rank").rank == (nice, os.getsid(0))
+        engine = ProcessEngine(step_back=STEP_BACK, program=PROGRAM)
+        task = Task(MISBEHAVE, MisbehaveRequest(how="rank"), tmp_path)
+        asked = engine.run(task, ignore_progress, NeverCancelled())
+        assert asked.rank == (min(os.nice(0) + 10, 19), os.getsid(0))
+
+    def test_it_steps_back_for_nobody_on_the_command_line(self, tmp_path: Path) -> None:
+        assert misbehave(tmp_path, "rank").rank == (os.nice(0), os.getsid(0))
 
     def test_errors_cross_whole(self, tmp_path: Path) -> None:
         with pytest.raises(InputError) as caught:

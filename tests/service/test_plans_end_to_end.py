@@ -16,6 +16,7 @@ from service_helpers import TestClient, files_under, rigwright, small_rig_text, 
 
 from geometry.head import synthetic_head
 from rig.build.mounts.planfile import plan_from_mapping, read_plan
+from rig.build.mounts.relaxing import MOST_LOSS
 from rig.design.designfile import design_from_mapping
 from service.api.app import create_app
 from service.api.context import Service
@@ -80,7 +81,9 @@ def test_a_plan_says_what_it_costs_and_how_it_is_set(plan: JSON, design: JSON) -
     designed, built = result["price"]["designed"], result["price"]["built"]
     loss = built["sigma_median_mm"] / designed["sigma_median_mm"] - 1.0
     assert result["price"]["sigma_loss"] == pytest.approx(loss)
-    assert loss < 0.05
+    # Room for settings may cost 3.5 %, and as much again where cameras that came to see what they
+    # did not are moved anew: without that this rig breaks six limits, at a loss of 1.2 %.
+    assert loss < 2.0 * MOST_LOSS
     assert len(result["cameras"]) == design["result"]["cameras"]
     for camera in result["cameras"]:
         assert {"height", "pan", "tilt", "roll"} <= {s["name"] for s in camera["settings"]}

@@ -75,7 +75,7 @@ def say(url: str) -> None:
 def main() -> None:
     set_up_logging()
     settings = read_settings(port=0, data_dir=Path(sys.argv[1]))
-    engine = ProcessEngine(settings.cancel_grace_s, "counting_job")
+    engine = ProcessEngine(settings.cancel_grace_s, program="counting_job")
     service = Service(settings, {**QUEUED, **counting_job.KINDS}, engine)
     serve(service, make(service), say)
     service.close()
