@@ -15,13 +15,12 @@ import numpy as np
 from geometry.arrays import Floats
 from geometry.camera import Camera
 from geometry.subject import Subject
-from solver.feasibility.places import BETWEEN_DEG, NEARER, STEP_DEG, Places, all_around
+from solver.feasibility.places import FINER_DEG, NEARER, STEP_DEG, Places, all_around
 from solver.limits import Box, HalfSpace, Limits, Sphere, Zone
 from solver.zones import in_rig_frame
 
+_PAIR = 2
 _SHARE_MARGIN = 0.01
-_BETWEEN_PAIRS = 0.1
-"""Base/height between the places looked at and those between them: 5.7 degrees are 0.1."""
 
 
 @dataclass(frozen=True)
@@ -41,10 +40,13 @@ class Hopeless:
 
 def hopeless(subject: Subject, camera: Camera, limits: Limits, count: int) -> Hopeless | None:
     """The first contradiction between the limits of a rig of ``count`` cameras; None for none."""
-    found = Places(subject, camera, limits)
-    for check in (_rooms, _bodies, _means, _standing, _cells, _seeing, _covering, _apart):
-        for told in check(found, count):
-            return told
+    for step_deg in (STEP_DEG, FINER_DEG):
+        found = Places(subject, camera, limits, step_deg)
+        for check in (_rooms, _bodies, _means, _standing, _cells, _seeing, _covering, _apart):
+            for told in check(found, count):
+                return told
+        if not found.scarce:
+            break
     return None
 
 
@@ -117,21 +119,21 @@ def _cells_of(zone: Zone, need_mm: float) -> float:
     return float(fits.prod(axis=1).min()) if len(fits) else np.inf
 
 
-def _bodies(found: Places, _count: int) -> Iterator[Hopeless]:
+def _bodies(found: Places, count: int) -> Iterator[Hopeless]:
     """Neighbours that must be nearer to each other than their bodies let them."""
     limits, smallest = found.limits, float(found.camera.body.size_mm.min())
-    near, far, gap = (
-        limits.base_height.neighbour_max,
-        limits.stand_off.max_mm,
-        limits.body_clearance_mm,
-    )
-    if near is not None and far is not None and gap is not None and near * far < smallest + gap:
+    ratios = limits.base_height
+    far, gap = limits.stand_off.max_mm, limits.body_clearance_mm
+    reach = min(np.inf if far is None else far, found.farthest_mm)
+    for key, ratio in (("neighbour_max", ratios.neighbour_max), ("max", ratios.max)):
+        if count < _PAIR or ratio is None or gap is None or ratio * reach >= smallest + gap:
+            continue
         yield Hopeless(
-            f"limits.base_height.neighbour_max is {near:g} at up to {far:g} mm, which puts "
-            f"neighbours {near * far:.0f} mm apart at most, but their bodies need "
+            f"limits.base_height.{key} is {ratio:g} at up to {reach:.0f} mm, which puts "
+            f"neighbours {ratio * reach:.0f} mm apart at most, but their bodies need "
             f"{smallest + gap:.0f} mm with limits.bodies.clearance_mm",
-            "allow a greater neighbour_max, a smaller clearance, or smaller bodies",
-            ("base_height_neighbour", "body_clearance"),
+            f"allow a greater {key}, a smaller clearance, or smaller bodies",
+            ("base_height", "body_clearance"),
         )
     spacing = limits.spacing
     if (
@@ -153,9 +155,9 @@ def _means(found: Places, _count: int) -> Iterator[Hopeless]:
     most = found.limits.incidence.mean_max_deg
     if most is None:
         return
-    cosine = np.clip(all_around(STEP_DEG) @ found.points.normals.T, -1.0, 1.0)
+    cosine = np.clip(all_around(found.step_deg) @ found.points.normals.T, -1.0, 1.0)
     least = float(np.degrees(np.arccos(cosine)).mean(axis=1).min())
-    if least - BETWEEN_DEG > most:
+    if least - found.between_deg > most:
         yield Hopeless(
             f"limits.incidence.mean_max_deg is {most:g}, but the subject's normals spread so far "
             f"that no axis meets them at less than {least:.0f} degrees on average",
@@ -271,11 +273,13 @@ def _apart(found: Places, count: int) -> Iterator[Hopeless]:
     away = found.distance_mm[found.standing]
     least = limits.base_height.min
     if least is not None and count > 1:
-        most = _count_apart(places, away, least - 2.0 * _BETWEEN_PAIRS)
+        most = _count_apart(places, away, least - 2.0 * found.between_ratio)
         widest = _widest(places, away)
-        if widest + _BETWEEN_PAIRS < least or most < count:
+        if widest + found.between_ratio < least or most < count:
             room = (
-                f"{widest:.2f} at most" if widest + _BETWEEN_PAIRS < least else f"room for {most}"
+                f"{widest:.2f} at most"
+                if widest + found.between_ratio < least
+                else f"room for {most}"
             )
             yield Hopeless(
                 f"limits.base_height.min is {least:g} for {count} cameras, but where they can "
@@ -286,7 +290,7 @@ def _apart(found: Places, count: int) -> Iterator[Hopeless]:
     gap = limits.body_clearance_mm
     if gap is not None and count > 1 and limits.stand_off.max_mm is not None:
         need = gap + float(found.camera.body.size_mm.min())
-        step = _BETWEEN_PAIRS * float(away.max())
+        step = found.between_ratio * float(away.max())
         most = _count_apart(places, np.ones(len(places)), need - 2.0 * step)
         if most < count:
             yield Hopeless(

@@ -12,12 +12,16 @@ from geometry.camera import Camera
 from geometry.subject import Subject
 from geometry.surface import SurfacePoints
 from solver.coverage.visibility import cast_rays
+from solver.feasibility.nearest import BETWEEN_AIMS, aims, depths, sharp_from_mm
 from solver.limits import Box, Limits, Sphere, StandOff, Zone
 from solver.motion import rest
 from solver.starts import better_roll
 from solver.zones import in_rig_frame, inside_any
 
 STEP_DEG = 8.0
+FINER_DEG = 4.0
+"""Steps between places: the finer where few can have what they see as the limits ask."""
+
 _POINTS = 500
 _RINGS = 8
 _FARTHEST_RADII = 100.0
@@ -26,6 +30,8 @@ _LEAST_SEEN = 3
 
 BETWEEN_DEG = 5.7
 """The middle of four places ``STEP_DEG`` apart is so far from each of them."""
+
+_FEW = 0.25
 
 NEARER = 0.8
 """A camera that aims and tilts as suits it best may stand this much nearer than one that looks at
@@ -39,6 +45,17 @@ class Places:
     subject: Subject
     camera: Camera
     limits: Limits
+    step_deg: float = STEP_DEG
+
+    @property
+    def between_deg(self) -> float:
+        """How far a camera may be from the nearest place as seen from the middle."""
+        return BETWEEN_DEG * self.step_deg / STEP_DEG
+
+    @property
+    def between_ratio(self) -> float:
+        """The same as base/height."""
+        return float(np.radians(self.between_deg))
 
     @cached_property
     def points(self) -> SurfacePoints:
@@ -63,7 +80,7 @@ class Places:
         """Directions (d, 3), the direction of each place (m,), and the places (m, 3)."""
         low, high = self.reach_mm
         distance = np.geomspace(low, high, _RINGS)
-        ways = all_around(STEP_DEG)
+        ways = all_around(self.step_deg)
         places = self.middle + (distance[None, :, None] * ways[:, None]).reshape(-1, 3)
         of = np.repeat(np.arange(len(ways)), _RINGS)
         zones = in_rig_frame(self.limits.zones, self.subject)
@@ -110,7 +127,7 @@ class Places:
     @cached_property
     def may_see(self) -> Bools:
         """What each place, or one beside it, may see, (m, p)."""
-        return np.asarray(self._cast(BETWEEN_DEG)[self._ways[1]])
+        return np.asarray(self._cast(self.between_deg)[self._ways[1]])
 
     @cached_property
     def useful(self) -> Bools:
@@ -153,10 +170,44 @@ class Places:
         return gsd * self.camera.focal_length_px + self.subject.design_points.radius_mm
 
     @cached_property
+    def _sharp_anyhow_mm(self) -> Floats:
+        """Distances (m,) below which nothing that is seen all about a place is sharp at once.
+
+        However the camera aims, and whatever its roll; zero where nothing is asked.
+        """
+        ways, of, places = self._ways
+        if not self.limits.depth_of_field or self.camera.focus_distance_mm is not None:
+            return np.zeros(len(places))
+        core = self._cast(-self.between_deg)
+        farthest = np.zeros(len(ways))
+        np.maximum.at(farthest, of, self.distance_mm)
+        used = [k for k in np.unique(of) if core[k].sum() >= _LEAST_SEEN]
+        out = np.zeros(len(ways))
+        found = [self._aimed(core[k], ways[k], farthest[k]) for k in used]
+        if found:
+            low, high, facing = (np.concatenate(each) for each in zip(*found, strict=True))
+            need = sharp_from_mm(self.camera, low, high) / facing
+            first = np.cumsum([0] + [len(each[0]) for each in found])[:-1]
+            out[used] = BETWEEN_AIMS * np.minimum.reduceat(need, first)
+        return np.asarray(out[of])
+
+    def _aimed(self, seen: Bools, way: Floats, farthest_mm: float) -> tuple[Floats, Floats, Floats]:
+        """Least and greatest depth about the middle, and cosine to ``way``, of each aim (a,)."""
+        mine = self.points.points_mm[seen] - self.middle
+        axes = aims(self.camera, mine, farthest_mm * way)
+        return (*depths(mine, axes), -(axes @ way))
+
+    @cached_property
     def standing(self) -> Bools:
         """Places (m,) at which a camera can stand and have all that it sees as the limits ask."""
         far = self.distance_mm <= self.farthest_mm
-        return np.asarray(self.useful & (self.distance_mm >= NEARER * self.sharp_mm) & far)
+        near = np.maximum(NEARER * self.sharp_mm, self._sharp_anyhow_mm)
+        return np.asarray(self.useful & (self.distance_mm >= near) & far)
+
+    @property
+    def scarce(self) -> bool:
+        """Whether so few places let a camera stand that a finer look may find them too few."""
+        return bool(self.standing.sum() < _FEW * self.useful.sum())
 
 
 def all_around(step_deg: float) -> Floats:
