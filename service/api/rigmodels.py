@@ -20,6 +20,13 @@ class RigStatus(Model):
     asked_by: Annotated[
         str, Field(description="Whose key or which operator asked for it; empty: nobody said.")
     ] = ""
+    aborts: Annotated[
+        int,
+        Field(
+            description="How often somebody aborted since the service began. Whoever counts down "
+            "to a capture stops when it has changed."
+        ),
+    ] = 0
     problem: Annotated[Problem | None, Field(description="Why it is not open.")]
     trigger: TriggerStatus | None
     cameras: list[CameraStatus]

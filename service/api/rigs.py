@@ -62,6 +62,7 @@ def _document(worker: StationWorker) -> RigStatus:
         status=rig_state(health, doing is not None, problem),
         doing=None if doing is None else at(f"/v1/{_PLURALS[doing.kind]}/{doing.id}"),
         asked_by=worker.asked_by,
+        aborts=worker.aborts,
         problem=None if problem is None else Problem.model_validate(problem_document(problem)),
         trigger=trigger_status(health, worker.box_abilities()),
         cameras=camera_statuses(worker.station, health),

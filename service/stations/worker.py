@@ -84,6 +84,7 @@ class StationWorker:
         self._problem: RigwrightError | None = None
         self._doing: JobRecord | None = None
         self._asked_by = ""
+        self._aborts = 0
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._serve, name=f"rig-{station.name}", daemon=True)
 
@@ -115,6 +116,11 @@ class StationWorker:
         """Who asked for what is being done; empty where nothing is, or nobody said."""
         return "" if self._doing is None else self._asked_by
 
+    @property
+    def aborts(self) -> int:
+        """How often somebody aborted since the service began."""
+        return self._aborts
+
     def box_abilities(self) -> TriggerCapabilities | None:
         """What the trigger box can do; None where there is none or it is not open."""
         rig = self._rig
@@ -139,6 +145,7 @@ class StationWorker:
     def abort(self) -> None:
         """All outputs low, now; what is being done ends. Allowed always, waits for nobody."""
         rig, doing = self._rig, self._doing
+        self._aborts += 1  # without the lock, which others hold while they write to disk
         if rig is None:
             raise self._not_open()
         try:

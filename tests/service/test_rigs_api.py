@@ -182,6 +182,11 @@ class TestCaptures:
         assert end(rig, ask(rig, capture_id="two"))["status"] == "completed"
         assert pulses(box) == fired + 1
 
+    def test_whoever_counts_down_to_one_can_know_of_an_abort(self, rig: TestClient) -> None:
+        before = rig.get("/v1/rigs/studio").json()["aborts"]
+        assert rig.post("/v1/rigs/studio/abort").json()["aborts"] == before + 1
+        assert rig.get("/v1/rigs").json()["items"][0]["aborts"] == before + 1
+
     def test_events_lead_to_the_end(self, rig: TestClient) -> None:
         job = ask(rig)
         with rig.stream("GET", job["links"]["events"]) as stream:

@@ -131,8 +131,12 @@ function heard(job, seen, signal) {
   });
 }
 
-export function pause(ms) {
-  return new Promise((resolve) => { setTimeout(resolve, ms); });
+/** Wait, no longer than until `signal` says to stop. */
+export function pause(ms, signal = undefined) {
+  return new Promise((resolve) => {
+    setTimeout(resolve, ms);
+    signal?.addEventListener("abort", resolve, { once: true });
+  });
 }
 
 /** Do something now and every so often, until the view is left. */

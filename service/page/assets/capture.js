@@ -21,12 +21,13 @@ export function capturing(rig, signal) {
   let own = "";
   let counting = null;
   let former = null; // what is taken again
+  let aborts = Infinity; // how many there were when the countdown began
 
   async function go(event) {
     event.preventDefault();
     const again = former;
     former = null;
-    if (counting) { counting.abort(); return; }
+    if (counting) { halt(); return; }
     const id = captureId();
     const asked = {
       capture_id: id, session: session.value, subject: subject.value,
@@ -34,11 +35,16 @@ export function capturing(rig, signal) {
       interval_us: Number(interval.value) * 1000,
     };
     counting = new AbortController();
+    const stopped = counting.signal;
     try {
-      if (!await counted(Number(countdown.value), fire, counting.signal, signal)) return;
+      if (!await waited(Number(countdown.value), stopped)) {
+        if (!signal.aborted) fill(place, h("p", { class: "note" }, "Stopped before anything fired."));
+        return;
+      }
       fire.disabled = true;
       own = at(`/v1/captures/${id}`);
       const job = await post(rig.links.captures, asked);
+      if (stopped.aborted) await post(rig.links.abort); // the first may have come before the capture
       if (again) await replaced(again.session, again.record.capture_id, id);
       await watch(place, job, outcome, signal);
       if (!signal.aborted) await kept(place, own, signal);
@@ -46,9 +52,22 @@ export function capturing(rig, signal) {
       if (!signal.aborted) fill(place, problem(error));
     } finally {
       counting = null;
+      aborts = Infinity;
       fire.disabled = false;
       fire.textContent = "Fire";
     }
+  }
+
+  /** End the countdown; what fires already is for the rig's own abort. */
+  function halt() {
+    counting?.abort();
+  }
+
+  /** Count down; false when it was stopped, here or by an abort at another browser. */
+  async function waited(seconds, stopped) {
+    if (!seconds) return true;
+    ({ aborts } = await get(rig.links.self, signal));
+    return await counted(seconds, fire, stopped, signal) && (await get(rig.links.self, signal)).aborts === aborts && !stopped.aborted;
   }
 
   function outcome(job) {
@@ -67,7 +86,8 @@ export function capturing(rig, signal) {
       field("Countdown, s", countdown)),
     fire, others, place);
 
-  return { element, know: (now) => {
+  return { element, halt, know: (now) => {
+    if (now.aborts > aborts) halt();
     const busy = now.status === "busy";
     if (!counting) fire.disabled = busy || now.status === "closed";
     const other = busy && now.doing && now.doing !== own;
@@ -89,7 +109,7 @@ function captureId() {
 async function counted(seconds, button, stopped, left) {
   for (let more = seconds; more > 0; more -= 1) {
     button.textContent = `${more} – press to stop`;
-    await pause(1000);
+    await pause(1000, stopped);
     if (stopped.aborted || left.aborted) return false;
   }
   button.textContent = "Firing";

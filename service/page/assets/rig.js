@@ -40,23 +40,27 @@ function panel(one, signal) {
   const told = h("div", { "aria-live": "polite" });
   const capture = capturing(one, signal);
   const sights = live(one, signal);
-  const act = async (path) => {
+  const act = async (path, said) => {
     try {
       await post(path);
-      fill(told);
+      fill(told, said && h("p", { class: "good" }, said));
     } catch (error) {
       fill(told, problem(error));
     }
   };
+  const abort = () => {
+    capture.halt(); // before anybody is asked: what counts down must not fire after it
+    return act(one.links.abort, "Aborted: all outputs are off.");
+  };
   const element = h("section", { class: "rig", "aria-label": one.name },
     h("div", { class: "heading" }, h("h1", {}, one.name), state,
-      h("button", { type: "button", class: "stop", onclick: () => act(one.links.abort) }, "Abort: all outputs off")),
+      h("button", { type: "button", class: "stop", onclick: abort }, "Abort: all outputs off")),
     told,
     h("div", { class: "split" }, h("div", {}, capture.element),
       h("div", {}, devices,
         h("div", { class: "row hardware" }, TESTS.map(([test, words, title]) =>
           h("button", { type: "button", class: "quiet", title, onclick: () => run(one, test, tested, signal) }, words)),
-        h("button", { type: "button", class: "quiet", title: "Let the box leave its fault. Fires nothing.", onclick: () => act(one.links.reset) }, "Reset the box")),
+        h("button", { type: "button", class: "quiet", title: "Let the box leave its fault. Fires nothing.", onclick: () => act(one.links.reset, "The box was reset.") }, "Reset the box")),
         tested)),
     sights.element);
   let before = "";

@@ -153,6 +153,26 @@ def test_a_countdown_can_be_stopped(visits: tuple[Visit, Visit], address: str) -
     assert len(read(f"{address}v1/captures")["items"]) == before
 
 
+def test_abort_stops_a_countdown_at_every_browser(
+    visits: tuple[Visit, Visit], box: FakeTrigger
+) -> None:
+    """Also at those that do not look at this moment: they ask before they fire."""
+    one, other = visits
+    fired = pulses(box)
+    for hands in (one, other):
+        one.page.get_by_label("Countdown, s").fill("4")
+        one.press("Fire")
+        one.page.get_by_role("button", name="press to stop").wait_for()
+        hands.press("Abort: all outputs off")
+        hands.see("Aborted: all outputs are off.")
+        one.see("Stopped before anything fired.")
+        one.page.get_by_role("button", name="Fire", exact=True).wait_for()
+        one.page.wait_for_timeout(4500)  # longer than was counted down
+        assert pulses(box) == fired
+    one.page.get_by_label("Countdown, s").fill("0")
+    one.sound()
+
+
 def told(**result: object) -> dict[str, object]:
     """A list of one job that somebody gave such names; only the browser is told of it."""
     links = {word: f"/v1/none/{word}" for word in ("self", "files", "report", "cancel", "events")}
