@@ -4,12 +4,12 @@ import { at, follow, get, pause, post } from "./api.js";
 import { field, fill, h, problem } from "./dom.js";
 import { watch } from "./job.js";
 import { replaced } from "./judged.js";
+import { kept, naming } from "./naming.js";
 import { sheet } from "./pictures.js";
 
 /** The form and the result for one rig. `know` is told how the rig is now. */
 export function capturing(rig, signal) {
-  const today = new Date().toLocaleDateString("sv");
-  const session = h("input", { value: today, pattern: "[A-Za-z0-9][A-Za-z0-9_.\\-]{0,63}", required: true, autocomplete: "off" });
+  const session = h("input", { pattern: "[A-Za-z0-9][A-Za-z0-9_.\\-]{0,63}", required: true, autocomplete: "off" });
   const subject = h("input", { maxlength: 200, autocomplete: "off" });
   const operator = h("input", { maxlength: 200, autocomplete: "off" });
   const shots = h("input", { type: "number", min: 1, max: 1000, value: 1 });
@@ -18,6 +18,9 @@ export function capturing(rig, signal) {
   const fire = h("button", { type: "submit", class: "fire hardware" }, "Fire");
   const place = h("div", { class: "result", "aria-live": "polite" });
   const others = h("p", { class: "note" });
+  const { rule, follow: named } = naming(session, subject);
+  kept(`capture ${rig.name}`, { session, subject, operator, shots, interval, countdown, rule });
+  named();
   let own = "";
   let counting = null;
   let former = null; // what is taken again
@@ -45,9 +48,11 @@ export function capturing(rig, signal) {
       own = at(`/v1/captures/${id}`);
       const job = await post(rig.links.captures, asked);
       if (stopped.aborted) await post(rig.links.abort); // the first may have come before the capture
-      if (again) await replaced(again.session, again.record.capture_id, id);
-      await watch(place, job, outcome, signal);
-      if (!signal.aborted) await kept(place, own, signal);
+      await watch(place, job, async (done) => {
+        if (again) await replaced(again.session, again.record.capture_id, id); // now that there is another
+        return outcome(done);
+      }, signal);
+      if (!signal.aborted) await left(place, own, signal);
     } catch (error) {
       if (!signal.aborted) fill(place, problem(error));
     } finally {
@@ -82,7 +87,7 @@ export function capturing(rig, signal) {
   const element = h("form", { class: "capture", onsubmit: go },
     h("p", { class: "note reader" }, "Your key may look and stop. To fire, sign in with one of scope hardware."),
     h("div", { class: "fields hardware" }, field("Session", session, "One folder of captures, for a subject or a day."),
-      field("Subject", subject, "For a new session."), field("Operator", operator, "Who fires: told to whoever else presses Fire meanwhile."), field("Shots", shots), field("Between shots, ms", interval),
+      field("Named by", rule), field("Subject", subject, "Told to a new session; one that is there keeps its own."), field("Operator", operator, "Who fires: told to whoever else presses Fire meanwhile."), field("Shots", shots), field("Between shots, ms", interval),
       field("Countdown, s", countdown)),
     fire, others, place);
 
@@ -106,11 +111,11 @@ function captureId() {
 }
 
 /** Count down on the button; false when it was pressed again, or the view was left. */
-async function counted(seconds, button, stopped, left) {
+async function counted(seconds, button, stopped, gone) {
   for (let more = seconds; more > 0; more -= 1) {
     button.textContent = `${more} – press to stop`;
     await pause(1000, stopped);
-    if (stopped.aborted || left.aborted) return false;
+    if (stopped.aborted || gone.aborted) return false;
   }
   button.textContent = "Firing";
   return true;
@@ -121,12 +126,12 @@ async function shown(place, path, outcome, signal) {
     await follow(await get(path, signal), () => {}, signal);
     const job = await get(path, signal);
     fill(place, job.result ? outcome(job) : problem({ message: job.problem?.detail ?? job.status }));
-    if (!job.result) await kept(place, path, signal);
+    if (!job.result) await left(place, path, signal);
   } catch { /* its own view tells */ }
 }
 
 /** What a capture that failed left in its session all the same. */
-async function kept(place, path, signal) {
+async function left(place, path, signal) {
   const job = await get(path, signal);
   if (job.result || job.status !== "failed") return;
   const id = job.id;

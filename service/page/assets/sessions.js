@@ -1,6 +1,6 @@
 // Sessions: what was photographed, to look at, prove whole and take away.
 
-import { get, post, remove } from "./api.js";
+import { at, get, post, remove } from "./api.js";
 import { fill, h, problem, table, when } from "./dom.js";
 import { address, sheet } from "./pictures.js";
 
@@ -62,6 +62,7 @@ async function one(root, name, signal) {
   fill(root, h("p", {}, h("a", { href: "#/sessions" }, "All sessions")),
     h("div", { class: "heading" }, h("h1", {}, name),
       h("button", { type: "button", class: "quiet", onclick: () => prove(own, proof) }, "Prove it whole"),
+      session.captures.length ? h("a", { class: "button", href: at(`${own}/archive`), download: true }, "All of it as a ZIP") : null,
       twice("Delete", `Delete ${name} and its ${session.captures.length} captures? For some days it can be restored.`, "Delete it", async () => {
         try {
           await remove(own);

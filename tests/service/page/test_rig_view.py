@@ -6,6 +6,7 @@ import json
 import signal
 import urllib.parse
 import urllib.request
+import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -143,6 +144,25 @@ def test_a_camera_is_aimed_on_the_screen_and_a_capture_goes_first(
     one.page.get_by_text("Live view", exact=True).click()
 
 
+def test_a_session_is_named_as_chosen_and_the_form_is_kept(visits: tuple[Visit, Visit]) -> None:
+    _, other = visits
+    session = other.page.get_by_label("Session", exact=True)
+    day = session.input_value()
+    other.page.get_by_label("Subject").fill("Zoë / 7")
+    assert session.input_value() == f"{day}-Zoe-7"
+    other.page.get_by_label("Named by").select_option("subject")
+    assert session.input_value() == "Zoe-7"
+    other.page.reload()
+    other.see("Trigger box: ready")
+    assert session.input_value() == "Zoe-7"
+    session.fill("anna")
+    other.page.get_by_label("Subject").fill("")
+    other.go("Sessions")
+    other.go("Rig")
+    other.see("Trigger box: ready")
+    assert session.input_value() == "anna", "what was typed is left alone"
+
+
 def test_a_countdown_can_be_stopped(visits: tuple[Visit, Visit], address: str) -> None:
     one, _ = visits
     before = len(read(f"{address}v1/captures")["items"])
@@ -151,6 +171,7 @@ def test_a_countdown_can_be_stopped(visits: tuple[Visit, Visit], address: str) -
     one.page.get_by_role("button", name="press to stop").click()
     one.page.get_by_role("button", name="Fire", exact=True).wait_for()
     assert len(read(f"{address}v1/captures")["items"]) == before
+    one.page.get_by_label("Countdown, s").fill("0")
 
 
 def test_abort_stops_a_countdown_at_every_browser(
@@ -269,6 +290,11 @@ def test_a_session_is_looked_at_and_proven(visits: tuple[Visit, Visit]) -> None:
     other.page.locator(".sheet img").nth(1).wait_for()
     other.press("Prove it whole")
     other.see("Whole: 2 captures,")
+    with other.page.expect_download() as told:
+        other.page.get_by_role("link", name="All of it as a ZIP").click()
+    with zipfile.ZipFile(told.value.path()) as archive:
+        assert archive.testzip() is None
+        assert "anna/session.json" in archive.namelist()
     other.sound()
 
 
