@@ -21,11 +21,12 @@ from calibration.adjustment.result import (
     LateView,
     WeakParameter,
 )
+from calibration.fieldcells import GRID, cells_of
+from geometry.arrays import Floats
 from geometry.camera import INTERIOR_NAMES
 
 WEAK_PRIOR_SHARE = 0.5
 STRONG_CORRELATION = 0.98
-GRID = 5
 CROSS_VALIDATION_LIMIT = 2.0
 COORDINATES_LIMIT = 1.5
 COVERAGE_LIMIT = 0.3
@@ -76,11 +77,8 @@ def _camera_row(judged: Judged, k: int) -> CameraQuality:
     )
 
 
-def _coverage(
-    pixels: np.ndarray[tuple[int, int], np.dtype[np.float64]], size: tuple[int, int]
-) -> float:
-    cells = np.clip(((pixels + 0.5) / np.array(size) * GRID).astype(int), 0, GRID - 1)
-    return len(np.unique(cells, axis=0)) / GRID**2
+def _coverage(pixels: Floats, size_px: tuple[int, int]) -> float:
+    return len(cells_of(pixels, size_px)) / GRID**2
 
 
 def weak_parameters(judged: Judged) -> tuple[WeakParameter, ...]:

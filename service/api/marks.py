@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from fastapi import APIRouter, Request
+from fastapi import APIRouter, Query, Request
 from pydantic import Field
 
 from service.api.context import ServiceDep
 from service.api.door import name_of
 from service.api.models import problems
-from service.kinds.base import Model
+from service.api.targetsets import target_file
+from service.kinds.base import Id, Model
 from service.kinds.sessions import MarksFile
+from service.stations.fields import FieldSeen, field_seen
 from service.stations.judged import (
     FiledLook,
     Place,
@@ -87,3 +89,20 @@ def read_look(service: ServiceDep, session: str, path: str) -> FiledLook:
     One is looked at at a time; what was seen of a picture is kept.
     """
     return filed_look(service.rigs.session_folder(session), path)
+
+
+@router.get(
+    "/v1/sessions/{session}/fields/{path:path}",
+    response_model=FieldSeen,
+    responses=problems(404, 422),
+)
+def read_field(
+    service: ServiceDep, session: str, path: str, target_set_id: Annotated[Id, Query()]
+) -> FieldSeen:
+    """Look where a picture shows targets, by the path that its capture's record gives.
+
+    All pictures of a camera together tell which part of its field is still empty. One is looked
+    at at a time; what was seen of a picture is kept.
+    """
+    targets = target_file(service, target_set_id)
+    return field_seen(service.rigs.session_folder(session), path, targets)

@@ -19,7 +19,14 @@ _STOPS = (
 
 _READS = (*_STOPS, "verify_session_files", "read_study_files", "sign_out")
 _CONFIGURES = (
-    *("add_scan", "remove_scan", "add_target_set", "propose_target_set", "remove_target_set"),
+    *(
+        "add_scan",
+        "remove_scan",
+        "add_target_set",
+        "add_target_file",
+        "propose_target_set",
+        "remove_target_set",
+    ),
     *("add_picture_set", "remove_picture_set", "add_design", "remove_design"),
     *("add_study", "remove_study"),
     *("add_plan", "remove_plan", "add_evaluation", "remove_evaluation"),

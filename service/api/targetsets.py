@@ -23,6 +23,7 @@ from service.tasks.targetsets import (
     TargetFile,
     given_targets,
     proposed_targets,
+    read_target_text,
     sheets_of_file,
 )
 
@@ -50,6 +51,13 @@ class TargetSetPage(Model):
 
     items: list[TargetSet]
     next: int | None
+
+
+class TargetText(Model):
+    """A target file: what it is called, and what it says."""
+
+    name: Annotated[str, Field(min_length=1, max_length=200)]
+    text: Annotated[str, Field(max_length=1_000_000, description="TOML.")]
 
 
 class ProposalRequest(Model):
@@ -110,7 +118,23 @@ def keep_targets(service: Service, targets: TargetFile) -> tuple[DocumentRecord,
 )
 def add_target_set(request: TargetsModel, response: Response, service: ServiceDep) -> TargetSet:
     """Add a target set: the structure of a target file, as JSON."""
-    record, new = keep_targets(service, given_targets(request))
+    return _added(service, given_targets(request), response)
+
+
+@router.post(
+    "/v1/target-files",
+    status_code=201,
+    response_model=TargetSet,
+    responses=problems(400, 413, 422, 507)
+    | {200: {"model": TargetSet, "description": "The target set was here already."}},
+)
+def add_target_file(request: TargetText, response: Response, service: ServiceDep) -> TargetSet:
+    """Add a target set as a target file says it."""
+    return _added(service, read_target_text(request.text, request.name), response)
+
+
+def _added(service: Service, targets: TargetFile, response: Response) -> TargetSet:
+    record, new = keep_targets(service, targets)
     response.status_code = 201 if new else 200
     response.headers["Location"] = at(f"{PATH}/{record.id}")
     return _document(record)

@@ -47,6 +47,7 @@ def body_examples() -> Mapping[str, Any]:
         "add_evaluation": {"scan_id": _SCAN, "rig": rig, "design": network},
         "add_plan": {"design_id": _DESIGN, "mount": {"kind": "t-slot"}},
         "add_target_set": {key: targets[key] for key in ("schema", "name", "plates")},
+        "add_target_file": {"name": "targets.toml", "text": _practice("targets.toml")},
         "propose_target_set": {"design_id": _DESIGN},
         "add_calibration": {
             "target_set_id": _TARGETS,

@@ -59,9 +59,14 @@ class Place:
     shot: int | None = None
 
 
+def picture_of(folder: Path, path: str) -> FrameEntry:
+    """The picture that a record of a session names ``path``. Raises :class:`NotFoundError`."""
+    return _frame(read_index(folder, Disk()), path)
+
+
 def filed_look(folder: Path, path: str) -> FiledLook:
     """Look at the picture that a record names ``path``. Raises :class:`NotFoundError`."""
-    frame = _frame(read_index(folder, Disk()), path)
+    frame = picture_of(folder, path)
     with _looking:
         seen = _seen(folder / path, frame.file.sha256)
     came = frame.status != FrameStatus.INCOMPLETE

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from calibration.targets.files import read_targets, targets_of, targets_text
+from calibration.targets.files import read_targets, targets_from, targets_of, targets_text
 from calibration.targets.kinds import TargetPlan
 from service.kinds.defaults import PAGE
 from service.kinds.targets import SeenByCamera, TargetsModel
@@ -35,6 +35,11 @@ class ProposedFile:
 def given_targets(given: TargetsModel) -> TargetFile:
     """Targets that somebody describes. Raises :class:`~common.errors.InputError`."""
     return _file_of(targets_of(given))
+
+
+def read_target_text(text: str, name: str) -> TargetFile:
+    """Targets of a target file called ``name``. Raises a one-line :class:`InputError`."""
+    return _file_of(targets_from(text, name))
 
 
 def proposed_targets(design: Path) -> ProposedFile:

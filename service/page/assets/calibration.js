@@ -1,7 +1,8 @@
 // Calibration and check: targets to print, cameras as they are, and the light that says whether they moved.
 
-import { all, get, post } from "./api.js";
+import { all, get, post, upload } from "./api.js";
 import { choice, field, figures, fill, frame, h, number, percent, problem, table } from "./dom.js";
+import { guide } from "./guide.js";
 import { asking } from "./asking.js";
 import { watch } from "./job.js";
 import { completed, files, links } from "./joblist.js";
@@ -28,7 +29,8 @@ async function overview(root, signal) {
   const pictures = [...sessions.items.map(({ name }) => [`s${name}`, `Session ${name}`]), ...sets.map((set) => [`p${set.id}`, `Pictures ${set.filename ?? set.id}`])];
   fill(root, h("h1", {}, "Calibration and check"),
     h("div", { class: "split" }, checkForm(known, pictures), calibrateForm(targets, pictures, designs)),
-    h("section", { class: "card" }, h("h2", {}, "Targets to print"), targetsForm(designs), h("ul", { class: "list" }, targets.map((set) => sheets(set, signal)))),
+    guide(targets, sessions.items, signal),
+    h("section", { class: "card" }, h("h2", {}, "Targets and pictures"), targetsForm(designs, () => overview(root, signal)), given(root, signal), h("ul", { class: "list" }, targets.map((set) => sheets(set, signal)))),
     h("h2", {}, "Checks"), links(checks, "calibration/checks", (job) => (job.result ? `${job.result.light}: ${job.result.text.slice(0, 90)}` : "Check")),
     h("h2", {}, "Calibrations"), links(calibrations, "calibration/calibrations", (job) => (job.result ? fit(job) : "Calibration")));
 }
@@ -44,7 +46,7 @@ function source(value) {
 function checkForm(known, pictures) {
   const which = choice(known, known[0]?.[0]);
   const from = choice(pictures, pictures[0]?.[0]);
-  const lacking = !known.length ? "There is no calibration to check against yet." : !pictures.length ? "Capture the targets first, under Rig." : "";
+  const lacking = !known.length ? "There is no calibration to check against yet." : !pictures.length ? "Capture the targets first, under Rig, or give pictures below." : "";
   return asking("Check: is it still as it was?", "Check", [field("Calibration", which), field("Pictures of targets", from)], lacking, async () => {
     const job = await post("/v1/checks", { calibration_id: which.value, pictures: source(from.value) });
     return `#/calibration/checks/${job.id}`;
@@ -56,7 +58,7 @@ function calibrateForm(targets, pictures, designs) {
   const from = choice(pictures, pictures[0]?.[0]);
   const start = choice([["", "nothing"], ...designs], designs[0]?.[0] ?? "");
   const name = h("input", { maxlength: 100 });
-  const lacking = !targets.length ? "Make targets first, below." : !pictures.length ? "Capture the targets in ten places or more first, under Rig." : "";
+  const lacking = !targets.length ? "Give or propose targets first, below." : !pictures.length ? "Capture the targets in ten places or more first, under Rig, or give pictures below." : "";
   return asking("Calibrate", "Calibrate", [field("Targets", set), field("Pictures of them", from), field("Begin from", start), field("Name", name)], lacking, async () => {
     const asked = { target_set_id: set.value, pictures: source(from.value), name: name.value };
     if (start.value) asked.design_id = start.value;
@@ -65,15 +67,36 @@ function calibrateForm(targets, pictures, designs) {
   });
 }
 
-function targetsForm(designs) {
+/** Targets and pictures that are there already, as files. */
+function given(root, signal) {
+  const said = h("div", { "aria-live": "polite" });
+  const taken = (accept, send) => h("input", { type: "file", accept, onchange: async (event) => {
+    const [file] = event.target.files;
+    if (!file) return;
+    fill(said, h("p", {}, `Reading ${file.name} …`));
+    try {
+      await send(file);
+      await overview(root, signal);
+    } catch (error) {
+      event.target.value = ""; // the same file, put right, can be chosen again
+      fill(said, problem(error));
+    }
+  } });
+  return h("div", { class: "configure" }, h("div", { class: "fields" },
+    field("Target file", taken(".toml", async (file) => post("/v1/target-files", { name: file.name, text: await file.text() })), "Targets that are there already, as TOML."),
+    field("Pictures", taken(".zip", (file) => upload(`/v1/picture-sets?filename=${encodeURIComponent(file.name)}`, file, () => {})),
+      "A ZIP with a folder for each camera; pictures of one moment have the same name.")), said);
+}
+
+function targetsForm(designs, again) {
   const which = choice(designs, designs[0]?.[0]);
   const said = h("div", {});
-  if (!designs.length) return h("p", { class: "note" }, "With a design, targets that suit its cameras are proposed here.");
+  if (!designs.length) return h("p", { class: "note" }, "With a design, targets that suit its cameras are proposed here, to be printed.");
   return h("div", { class: "row configure" }, field("For the cameras of", which), h("button", { type: "button", class: "quiet", onclick: async () => {
     try {
       const made = await post("/v1/target-set-proposals", { design_id: which.value });
       fill(said, h("p", { class: "good" }, `${made.target_set.targets} targets.`), h("ul", {}, made.notes.map((note) => h("li", {}, note))),
-        h("a", { href: "", onclick: () => location.reload() }, "Show them below"));
+        h("button", { type: "button", class: "quiet", onclick: again }, "Show them below"));
     } catch (error) {
       fill(said, problem(error));
     }
