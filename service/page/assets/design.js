@@ -1,9 +1,11 @@
 // Designs: a scan and a rig's limits in, the rig that measures best out.
 
 import { all, get, post, upload } from "./api.js";
-import { choice, field, figures, fill, frame, h, number, percent, problem, table } from "./dom.js";
+import { choice, field, figures, fill, frame, h, number, percent, problem } from "./dom.js";
+import { compare } from "./compare.js";
 import { watch } from "./job.js";
 import { files, links } from "./joblist.js";
+import { conflicts } from "./relax.js";
 import { rigForm } from "./rigform.js";
 
 /** The form with the designs there are, or one of them. */
@@ -50,7 +52,7 @@ async function form(root, signal) {
       h("section", { class: "card" }, h("h2", {}, "2. The rig"),
         h("div", { class: "fields" }, field("Cameras", count, "How many to place."), field("Begin with", example)), place),
       h("section", { class: "card" }, h("h2", {}, "3. Start"), start, said)),
-    h("h2", {}, "Designs"),
+    h("h2", {}, "Designs"), compare(made),
     links(made, "design", (job) => (job.result ? `${job.result.name || "Design"}, ${job.result.cameras} cameras, sigma ${microns(job.result.sigma_median_mm)}` : "Design")));
 }
 
@@ -102,8 +104,8 @@ async function outcome(job, signal) {
   const seen = result.coverage.map(({ views, share }) => [`Seen by ${views} or more`, percent(share)]);
   return [
     h("p", { class: result.feasible ? "good" : "bad" }, result.feasible ? "Every limit is kept." : "The limits contradict each other: this is the nearest rig."),
-    result.conflicts.length ? table("What would have to give way", ["Limit", "With the others", "Alone"], result.conflicts.map((one) =>
-      [one.family, number(one.give, one.unit), number(one.give_alone, one.unit)])) : null,
+    result.contradiction ? h("p", { class: "bad" }, result.contradiction) : null,
+    result.conflicts.length ? await conflicts(job, signal) : null,
     figures([["Cameras", result.cameras], ["Sigma, median", microns(result.sigma_median_mm)], ["Sigma, 95 %", microns(result.sigma_p95_mm)], ...seen]),
     h("div", { class: "row" }, h("a", { class: "button main configure", href: `#/build/new/${encodeURIComponent(job.id)}` }, "Plan its mount"), await exportsOf(job, signal)),
     frame("Report", `${job.links.self}/report`),
