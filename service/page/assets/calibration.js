@@ -2,6 +2,7 @@
 
 import { all, get, post, upload } from "./api.js";
 import { choice, field, figures, fill, frame, h, number, percent, problem, table } from "./dom.js";
+import { accepted, acceptForm } from "./acceptance.js";
 import { guide } from "./guide.js";
 import { asking } from "./asking.js";
 import { watch } from "./job.js";
@@ -17,21 +18,26 @@ export async function calibration(root, [what, id], signal) {
   } else if (what === "checks") {
     fill(root, back, h("h1", {}, "Check"), place);
     await watch(place, await get(`/v1/checks/${encodeURIComponent(id)}`, signal), (job) => checked(job, signal), signal);
+  } else if (what === "acceptances") {
+    fill(root, back, h("h1", {}, "Acceptance test"), place);
+    await watch(place, await get(`/v1/acceptances/${encodeURIComponent(id)}`, signal), (job) => accepted(job, signal), signal);
   } else await overview(root, signal);
 }
 
 async function overview(root, signal) {
-  const [targets, sets, sessions, designed, calibrations, checks] = await Promise.all([
+  const [targets, sets, sessions, designed, calibrations, checks, acceptances] = await Promise.all([
     all("/v1/target-sets", signal), all("/v1/picture-sets", signal), get("/v1/sessions", signal),
-    all("/v1/designs", signal), all("/v1/calibrations", signal), all("/v1/checks", signal)]);
+    all("/v1/designs", signal), all("/v1/calibrations", signal), all("/v1/checks", signal), all("/v1/acceptances", signal)]);
   const designs = completed(designed, (job) => `${job.result.name || "Design"}, ${job.result.cameras} cameras`);
   const known = completed(calibrations, fit);
   const pictures = [...sessions.items.map(({ name }) => [`s${name}`, `Session ${name}`]), ...sets.map((set) => [`p${set.id}`, `Pictures ${set.filename ?? set.id}`])];
   fill(root, h("h1", {}, "Calibration and check"),
     h("div", { class: "split" }, checkForm(known, pictures), calibrateForm(targets, pictures, designs)),
     guide(targets, sessions.items, signal),
+    acceptForm(known, targets, pictures, source),
     h("section", { class: "card" }, h("h2", {}, "Targets and pictures"), targetsForm(designs, () => overview(root, signal)), given(root, signal), h("ul", { class: "list" }, targets.map((set) => sheets(set, signal)))),
     h("h2", {}, "Checks"), links(checks, "calibration/checks", (job) => (job.result ? `${job.result.light}: ${job.result.text.slice(0, 90)}` : "Check")),
+    h("h2", {}, "Acceptance tests"), links(acceptances, "calibration/acceptances", (job) => (job.result ? `${job.result.outcome}: ${job.result.text.slice(0, 90)}` : "Acceptance test")),
     h("h2", {}, "Calibrations"), links(calibrations, "calibration/calibrations", (job) => (job.result ? fit(job) : "Calibration")));
 }
 

@@ -96,7 +96,7 @@ export function capturing(rig, signal) {
     const busy = now.status === "busy";
     if (!counting) fire.disabled = busy || now.status === "closed";
     const other = busy && now.doing && now.doing !== own;
-    others.textContent = other ? `The rig is at work for ${now.asked_by || "somebody else"}.` : "";
+    others.textContent = other ? `The rig is at work${now.asked_by ? ` for ${now.asked_by}` : ""}.` : "";
     if (other && now.doing.startsWith(at("/v1/captures/"))) {
       own = now.doing; // shown here as well: everybody at the rig sees the last capture
       shown(place, now.doing, outcome, signal);

@@ -41,7 +41,7 @@ function side(jobs) {
     return [words, ...values.map((value) => (value !== null && value === best ? h("strong", { class: "state good" }, show(value)) : show(value)))];
   });
   const links = jobs.map((job) => h("a", { href: `#/design/${encodeURIComponent(job.id)}` }, title(job)));
-  return [table("", ["", ...links], rows), h("p", { class: "note" }, "Green is the best of a row.")];
+  return [table("", ["", ...links], rows), h("p", { class: "note" }, "The best of each row is marked.")];
 }
 
 function microns(mm) {

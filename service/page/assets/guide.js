@@ -50,7 +50,7 @@ async function followed(session, set, told, place, signal) {
         }
         looked.add(id);
       }
-      told.textContent = `${looked.size} captures looked at. ${next(cameras)}`;
+      told.textContent = `${looked.size} ${looked.size === 1 ? "capture" : "captures"} looked at. ${next(cameras)}`;
       await pause(3000, signal);
     }
   } catch (error) {
@@ -89,5 +89,5 @@ function picture(name, filled) {
     for (const [key, value] of Object.entries({ x: 30 * (cell % SIDE) + 1, y: 20 * Math.floor(cell / SIDE) + 1, width: 28, height: 18, class: filled.has(cell) ? "full" : "" })) made.setAttribute(key, value);
     svg.append(made);
   }
-  return h("figure", {}, svg, h("figcaption", {}, name, percent(filled.size / SIDE ** 2)));
+  return h("figure", {}, svg, h("figcaption", {}, name, h("span", {}, percent(filled.size / SIDE ** 2))));
 }
