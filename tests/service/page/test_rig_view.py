@@ -256,7 +256,7 @@ def test_one_fires_the_other_is_told_and_a_crash_fires_nothing_again(
     for visit, name in zip(visits, ("anna", "bert"), strict=True):
         visit.go("Rig")
         visit.see("Trigger box: ready")
-        visit.page.get_by_label("Session", exact=True).fill("crash")
+        visit.page.get_by_label("Session", exact=True).fill("a-crash")
         visit.page.get_by_label("Operator").fill(name)
         visit.page.get_by_label("Shots", exact=True).fill(str(SHOTS))
         visit.page.get_by_label("Between shots, ms").fill("500")
