@@ -43,12 +43,14 @@ function reconstructForm(sessions, cameras, signal) {
   const capture = choice([]);
   const list = async () => {
     const held = await get(`/v1/sessions/${encodeURIComponent(session.value)}`, signal).catch(() => ({ captures: [] }));
-    fill(capture, held.captures.toReversed().map(({ capture_id: id }) => h("option", { value: id }, id)));
+    fill(capture, held.captures.length ? held.captures.toReversed().map(({ capture_id: id }) => h("option", { value: id }, id))
+      : h("option", { value: "" }, "none in this session"));
   };
   const session = choice(sessions.map(({ name }) => [name, name]), sessions.at(-1)?.name, list);
   const where = choice(cameras, cameras[0]?.[0]);
   if (!lacking) list();
   return asking("Make a surface", "Reconstruct", [field("Session", session), field("Capture", capture), field("Cameras", where)], lacking, async () => {
+    if (!capture.value) throw new Error(`session ${session.value} holds no capture; choose another`);
     const asked = { pictures: { session: session.value, captures: [capture.value] } };
     asked[where.value.startsWith("c") ? "calibration_id" : "design_id"] = where.value.slice(1);
     return `#/surface/reconstructions/${(await post("/v1/reconstructions", asked)).id}`;

@@ -327,6 +327,15 @@ def test_a_surface_is_asked_for_with_what_was_chosen(visits: tuple[Visit, Visit]
     one.go("Surface")
     one.page.get_by_label("Capture", exact=True).locator("option").first.wait_for(state="attached")
     one.sound()
+    one.page.get_by_label("Session", exact=True).select_option("a-crash")
+    one.page.get_by_label("Capture", exact=True).get_by_text("none in this session").wait_for(
+        state="attached"
+    )
+    one.press("Reconstruct")
+    one.see("session a-crash holds no capture; choose another")
+    assert bodies == []
+    one.page.get_by_label("Session", exact=True).select_option("anna")
+    one.page.get_by_label("Capture", exact=True).get_by_text("none").wait_for(state="detached")
     one.press("Reconstruct")
     one.see("too many wait")
     one.page.unroute_all()
