@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from contextlib import suppress
 from datetime import datetime
 
 from rig.acquisition.cameras.base import Frame, FrameStatus, TriggerKind
+from rig.acquisition.session.intents import Intent
 from rig.acquisition.session.records import CaptureRecord, FrameEntry, UnfiledEntry
 from rig.acquisition.station.spec import Station
 from rig.acquisition.synchrony.cameraframes import Method, Pair
@@ -21,15 +23,41 @@ def recall(
     station: Station,
     records: Sequence[CaptureRecord],
     cameras: Collection[str],
+    intents: Sequence[Intent] = (),
 ) -> None:
-    """Let ``evidence`` learn what the captures of a session showed of ``cameras``."""
-    for record in records[-RECALLED:]:
-        try:
-            past = _past(station, record, cameras)
-        except ValueError:
-            # A record that was damaged teaches nothing; `sessions verify` tells of it.
+    """Let ``evidence`` learn what the captures of a session showed of ``cameras``.
+
+    ``intents``: of those that were interrupted; their pictures may still come, as after a miss.
+    """
+    steps: list[tuple[int, CaptureRecord | Intent]] = []
+    # A record that was damaged teaches nothing; `sessions verify` tells of it.
+    for record in records:
+        with suppress(ValueError):
+            steps.append((_fired_ns(record), record))
+    for intent in intents:
+        with suppress(ValueError):
+            steps.append((intent.at_ns, intent))
+    for at_ns, step in sorted(steps, key=lambda one: one[0])[-RECALLED:]:
+        if isinstance(step, Intent):
+            shots = fired_shots(step.capture_id, at_ns, step.shots, step.interval_us)
+            missed(evidence, shots, cameras)
             continue
-        evidence.recall(past)
+        with suppress(ValueError):
+            evidence.recall(_past(station, step, cameras))
+
+
+def missed(evidence: FileEvidence, shots: tuple[FiredShot, ...], cameras: Collection[str]) -> None:
+    """Shots that were fired, or may have been, and of which no picture was filed."""
+    evidence.recall([(FileDelivery(name, (), shots, 0), ()) for name in cameras])
+
+
+def fired_shots(
+    capture_id: str, first_ns: int, shots: int, interval_us: float
+) -> tuple[FiredShot, ...]:
+    """The shots of a capture, the first at ``first_ns`` since 1970."""
+    return tuple(
+        FiredShot(capture_id, k + 1, first_ns + round(k * interval_us * 1e3)) for k in range(shots)
+    )
 
 
 def _past(
@@ -60,13 +88,13 @@ def _wait_ns(station: Station) -> int:
 
 
 def _shots(record: CaptureRecord) -> tuple[FiredShot, ...]:
-    first_ns = round(datetime.fromisoformat(record.fired_at).timestamp() * 1e9)
     stopped = record.trigger is not None and record.trigger.outcome == "partial"
     made = record.trigger.shots_done if stopped and record.trigger else record.shots
-    return tuple(
-        FiredShot(record.capture_id, k + 1, first_ns + round(k * record.interval_us * 1e3))
-        for k in range(made)
-    )
+    return fired_shots(record.capture_id, _fired_ns(record), made, record.interval_us)
+
+
+def _fired_ns(record: CaptureRecord) -> int:
+    return round(datetime.fromisoformat(record.fired_at).timestamp() * 1e9)
 
 
 def _pairs(record: CaptureRecord, camera: str) -> tuple[Pair, ...]:

@@ -12,8 +12,8 @@ from common.closing import Closing
 from common.errors import ConflictError, InputError, RigwrightError
 from common.progress import CancelToken, NeverCancelled, Progress, ProgressCallback, ignore_progress
 from rig.acquisition.capture.devices import DeviceMaker
-from rig.acquisition.capture.filememory import recall
-from rig.acquisition.capture.firing import CaptureOrder, Fate
+from rig.acquisition.capture.filememory import fired_shots, missed, recall
+from rig.acquisition.capture.firing import CaptureOrder, Fate, Firing
 from rig.acquisition.capture.judging import pair_and_judge
 from rig.acquisition.capture.liveview import LiveView
 from rig.acquisition.capture.opening import OpenCameras
@@ -36,6 +36,7 @@ from rig.acquisition.capture.rigfacts import (
 from rig.acquisition.capture.run import CaptureRun
 from rig.acquisition.capture.selftest import self_test
 from rig.acquisition.session.folder import Session
+from rig.acquisition.session.intents import interrupted_intents
 from rig.acquisition.session.naming import EitherToken, box_name
 from rig.acquisition.session.records import CaptureRecord
 from rig.acquisition.session.staging import Stage
@@ -178,10 +179,26 @@ class Rig(Closing):
 
     def _recall(self, session: Session) -> None:
         """Learn from the session what another run of this rig learned of cameras' files."""
-        threads = self._cameras.threads(self.station)
-        names = [t.plan.name for t in threads if t.device.capabilities.by_files]
+        names = self._by_files()
         if names and not self._files.begun:
-            recall(self._files, self.station, session.index.records, names)
+            aside = interrupted_intents(session.index)
+            recall(self._files, self.station, session.index.records, names, aside)
+
+    def _by_files(self) -> list[str]:
+        """The cameras that are only seen through their files."""
+        threads = self._cameras.threads(self.station)
+        return [t.plan.name for t in threads if t.device.capabilities.by_files]
+
+    def _fire(self, run: CaptureRun) -> Firing:
+        """Run it; what it fired in vain is remembered, as its pictures may still come."""
+        try:
+            return run.run()
+        except BaseException:
+            if run.fate is not Fate.NOT_FIRED:
+                order, at_ns = run.order, run.began_ns
+                shots = fired_shots(order.capture_id, at_ns, order.shots, order.interval_us)
+                missed(self._files, shots, self._by_files())
+            raise
 
     def _commit(
         self, stage: Stage, captured: CaptureData, evidence: Evidence, partial: bool
@@ -207,7 +224,7 @@ class Rig(Closing):
     ) -> tuple[CaptureData, Evidence]:
         """Fire and judge; on any error the stage tells what became of the id."""
         try:
-            firing = run.run()
+            firing = self._fire(run)
             run.progress(Progress("checking pictures", 0.7))
             sizes = picture_sizes(self.station, self._design)
             captured = pair_and_judge(self.station, firing, self._fit, sizes, self._files)
@@ -281,7 +298,7 @@ class Rig(Closing):
     ) -> tuple[CaptureData, Evidence]:
         """One capture of which nothing is filed."""
         order = CaptureOrder(f"sync-check-{number}", box_name("sync-check"))
-        firing = self._run(order, ignore_progress, cancel).run()
+        firing = self._fire(self._run(order, ignore_progress, cancel))
         sizes = picture_sizes(self.station, self._design)
         captured = pair_and_judge(self.station, firing, self._fit, sizes, self._files)
         return captured, gather(self.station, captured, board or station_board(self.station))
@@ -305,7 +322,11 @@ class Rig(Closing):
             order=order,
             progress=progress,
             cancel=EitherToken(cancel, self._aborted),
-            may_fire=lambda: None if stage is None else stage.may_fire(order.box_capture),
+            may_fire=lambda: (
+                None
+                if stage is None
+                else stage.may_fire(order.box_capture, order.shots, order.interval_us)
+            ),
             unopened=dict(self._cameras.problems),
         )
 

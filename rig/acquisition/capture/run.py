@@ -52,6 +52,8 @@ class CaptureRun:
     unopened: Mapping[str, str] = field(default_factory=dict)
     """Cameras of the station that could not be opened, and why."""
     fate: Fate = Fate.NOT_FIRED
+    began_ns: int = 0
+    """When FIRE was sent, in ns since 1970."""
     _armed: list[str] = field(default_factory=list)
     _give_up: threading.Event = field(default_factory=threading.Event)
     _pictures: int = 0
@@ -160,7 +162,7 @@ class CaptureRun:
         }
         jobs = {thread.plan.name: _collect(thread, collectors) for thread in threads}
         self.fate = Fate.UNKNOWN
-        before = time.monotonic_ns()
+        before, self.began_ns = time.monotonic_ns(), time.time_ns()
         start.set()
         try:
             with self._abort_when_cancelled():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from datetime import timedelta
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 from common.errors import ConflictError, RigwrightError
@@ -13,7 +13,8 @@ from rig.acquisition.session import paths
 from rig.acquisition.session.commit import clear_stage, publish, set_aside
 from rig.acquisition.session.exif import PictureFacts
 from rig.acquisition.session.folder import Session
-from rig.acquisition.session.jsonfiles import entry, json_bytes, model_bytes
+from rig.acquisition.session.intents import Intent
+from rig.acquisition.session.jsonfiles import entry, model_bytes
 from rig.acquisition.session.pictures import filed
 from rig.acquisition.session.recording import FiledFrame, Numbering, make_record
 from rig.acquisition.session.records import CaptureRecord
@@ -55,12 +56,18 @@ class Stage:
             _refuse_other_disks(session.folder)
             session.index.disk.make_folder(self._folder)
 
-    def may_fire(self, box_capture: str) -> None:
+    def may_fire(self, box_capture: str, shots: int, interval_us: float) -> None:
         """From now on this capture may have fired, until somebody says otherwise."""
-        intent = {"capture_id": self._id, "box_capture": box_capture}
+        intent = Intent(
+            capture_id=self._id,
+            box_capture=box_capture,
+            shots=shots,
+            interval_us=interval_us,
+            at=datetime.now(UTC).astimezone().isoformat(),
+        )
         with disk_errors(self._session.folder):
             index = self._session.index
-            index.disk.replace(self._folder / paths.INTENT, json_bytes(intent), index.scratch)
+            index.disk.replace(self._folder / paths.INTENT, model_bytes(intent), index.scratch)
 
     def drop(self) -> None:
         """Nothing was fired: nothing is left."""

@@ -15,7 +15,11 @@ import pytest
 from PIL import Image
 from tethered import CAMERAS, Tethered, held, jpeg, station
 
+from common.errors import CancelledError
+from rig.acquisition.capture.rig import Rig
+from rig.acquisition.session.folder import Session
 from rig.acquisition.session.records import CaptureRecord
+from rig.acquisition.session.staging import Stage
 from rig.acquisition.session.verify import verify_session
 from rig.devices.station import open_station
 
@@ -167,3 +171,39 @@ def test_a_folder_that_blinks_while_its_camera_is_armed(tethered: Tethered, empt
     record = tethered.capture("two", tethered.sound(2), delay_s=0.4)
     assert record.state == "complete", record.faults
     assert not record.faults
+
+
+def silent(tethered: Tethered, number: int) -> None:
+    """Every camera's picture of a shot, by a program that writes no times."""
+    for name in CAMERAS:
+        tethered.write(name, f"DSC_{number:04d}.JPG", None)
+
+
+@pytest.mark.parametrize("end", ["aborted", "killed", "both programs end"])
+def test_late_pictures_of_an_interrupted_capture_are_not_those_of_the_next(
+    tmp_path: Path, end: str
+) -> None:
+    root, folder = tmp_path / "tether", tmp_path / "session"
+
+    def second(tethered: Tethered) -> CaptureRecord:
+        return tethered.capture("two", lambda _: silent(tethered, 1))
+
+    def opened() -> Rig:
+        return open_station(station(root), locks=tmp_path / "locks")
+
+    record = None
+    with opened() as rig, rig.new_session(folder) as session:
+        tethered = Tethered(rig, session, root)
+        if end == "killed":
+            # All that is left on the disk of a program that was killed after the shot.
+            Stage(session, "one").may_fire("box", 1, 0.0)
+        else:
+            with pytest.raises(CancelledError):
+                tethered.capture("one", lambda _: rig.abort())
+        if end == "aborted":
+            record = second(tethered)
+    if record is None:
+        with opened() as rig, Session.open(folder) as session:
+            record = second(Tethered(rig, session, root))
+    assert set(record.missing) == set(CAMERAS)
+    assert "an earlier picture has not come" in held(record)
