@@ -17,6 +17,7 @@ from rig.acquisition.cameras.base import (
     TimestampKind,
     TriggerKind,
 )
+from rig.acquisition.synchrony.fileoutlook import FileOutlook
 from rig.acquisition.synchrony.imagechecks import is_raw
 from rig.acquisition.synchrony.triggertimes import HostInterval
 
@@ -56,6 +57,18 @@ class Want:
     patience_s: float = 0.0
     ready_stamp: int | None = None
     kinds: frozenset[str] = frozenset()
+    outlook: FileOutlook | None = None
+    """Which files of a camera that is only seen through them may be of these shots."""
+    began_ns: int = 0
+    """When ``start`` was set, in ns since 1970."""
+
+    def likely(self, frames: Sequence[Frame]) -> Sequence[Frame]:
+        """Those of ``frames`` that will not be held back."""
+        if self.outlook is None:
+            return frames
+        step_ns = round(self.interval_s * 1e9)
+        first_ns = self.began_ns + round(self.first_s * 1e9)
+        return self.outlook.likely(frames, [first_ns + k * step_ns for k in range(self.shots)])
 
 
 @dataclass(frozen=True)
@@ -116,6 +129,7 @@ class Collector:
         """All of it; what the library raises becomes the camera's problem."""
         self._want.start.wait()
         self._began, self._start_ns = time.monotonic(), time.monotonic_ns()
+        self._want = replace(self._want, began_ns=time.time_ns())
         try:
             if self._device.capabilities.trigger is TriggerKind.SOFTWARE:
                 self._command()
@@ -226,21 +240,25 @@ class Collector:
 def wanted(frames: Sequence[Frame], want: Want, start_ns: int) -> int:
     """How many of the pictures can be of this capture's shots.
 
-    Copies count once, and what was there or exposed before FIRE, or what the camera doubts, not at
-    all: else the wait would end before the last true picture has come. Where each shot makes files
-    of several kinds, the kind counts of which there are fewest; where it is not said which, that of
-    which there are most.
+    Copies count once, and what was there or exposed before FIRE, what the camera doubts, or what by
+    its time is of another shot, not at all: else the wait would end before the last true picture
+    has come. Where each shot makes files of several kinds, the kind counts of which there are
+    fewest; where it is not said which, that of which there are most.
     """
     seen: dict[str, set[tuple[int | None, ...]]] = {kind: set() for kind in want.kinds}
-    for k, frame in enumerate(frames):
-        stale = frame.arrived_host_ns < start_ns
-        stale |= not frame.metadata.keys().isdisjoint(("known_as", "unlikely", "last_written"))
-        if want.ready_stamp is not None and frame.device_ns is not None:
-            stale |= frame.device_ns < want.ready_stamp
-        if not stale:
-            known = frame.counter is not None or frame.device_ns is not None
-            kind = frame.media_type if want.kinds else str(is_raw(frame))
-            seen.setdefault(kind, set()).add((frame.counter, frame.device_ns) if known else (k,))
+    fresh = [frame for frame in frames if not _is_stale(frame, want, start_ns)]
+    for k, frame in enumerate(want.likely(fresh)):
+        known = frame.counter is not None or frame.device_ns is not None
+        kind = frame.media_type if want.kinds else str(is_raw(frame))
+        seen.setdefault(kind, set()).add((frame.counter, frame.device_ns) if known else (k,))
     if want.kinds:
         return min(len(seen[kind]) for kind in want.kinds)
     return max(map(len, seen.values()), default=0)
+
+
+def _is_stale(frame: Frame, want: Want, start_ns: int) -> bool:
+    if frame.arrived_host_ns < start_ns:
+        return True
+    if want.ready_stamp is not None and frame.device_ns is not None:
+        return frame.device_ns < want.ready_stamp
+    return not frame.metadata.keys().isdisjoint(("known_as", "unlikely", "last_written"))

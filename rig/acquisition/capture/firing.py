@@ -7,9 +7,15 @@ from dataclasses import dataclass
 from datetime import datetime
 from enum import StrEnum
 
-from rig.acquisition.cameras.base import CameraSettings, ClockSample
+from rig.acquisition.cameras.base import (
+    CameraCapabilities,
+    CameraSettings,
+    ClockSample,
+    TriggerKind,
+)
 from rig.acquisition.capture.camerathreads import CameraThread
 from rig.acquisition.capture.collect import Collected
+from rig.acquisition.station.spec import CapturePolicy
 from rig.acquisition.synchrony.faults import Fault
 from rig.acquisition.synchrony.triggertimes import HostInterval
 from rig.acquisition.trigger.box import ArmRequest, FireOutcome, FireReport
@@ -69,3 +75,12 @@ class Firing:
     collected: Mapping[str, Collected]
     absent: tuple[str, ...] = ()
     faults: tuple[Fault, ...] = ()
+
+
+def file_wait_ns(policy: CapturePolicy, capabilities: CameraCapabilities) -> int:
+    """How much later than told the shot of a camera that is seen through its files may be.
+
+    Where the box does not fire it, somebody does when he pleases.
+    """
+    edge = capabilities.trigger is TriggerKind.EDGE
+    return 0 if edge else round(policy.frame_deadline_s * 1e9)

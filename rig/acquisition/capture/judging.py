@@ -15,7 +15,7 @@ from rig.acquisition.cameras.base import (
 )
 from rig.acquisition.capture.camerathreads import CameraThread
 from rig.acquisition.capture.collect import Collected
-from rig.acquisition.capture.firing import Firing
+from rig.acquisition.capture.firing import Firing, file_wait_ns
 from rig.acquisition.station.spec import CameraPlan, Station
 from rig.acquisition.synchrony.cameraframes import CameraFrames, Method, Pairing
 from rig.acquisition.synchrony.capturedata import CameraPart, CaptureData
@@ -202,7 +202,6 @@ def _unfiled(given: FileDelivery, pairing: Pairing, raws: Pairing | None) -> tup
 def _delivery(station: Station, firing: Firing, part: CameraPart, wall_ns: int) -> FileDelivery:
     received, capture_id = part.received, firing.order.capture_id
     first = received.trigger_times[0]
-    edge = received.capabilities.trigger is TriggerKind.EDGE
     return FileDelivery(
         camera=part.plan.name,
         frames=firing.collected[part.plan.name].frames,
@@ -212,8 +211,7 @@ def _delivery(station: Station, firing: Firing, part: CameraPart, wall_ns: int) 
             for t in received.trigger_times
         ),
         first_host_ns=first.at_host_ns - round(first.uncertainty_us * 1e3),
-        # Where somebody else fires, the shot is when that somebody pleases.
-        wait_ns=0 if edge else round(station.policy.frame_deadline_s * 1e9),
+        wait_ns=file_wait_ns(station.policy, received.capabilities),
         kinds=part.plan.kinds,
     )
 

@@ -328,6 +328,7 @@ class Rig(Closing):
                 else stage.may_fire(order.box_capture, order.shots, order.interval_us)
             ),
             unopened=dict(self._cameras.problems),
+            files=self._files,
         )
 
     @contextlib.contextmanager

@@ -22,10 +22,12 @@ from common.progress import CancelToken, Progress, ProgressCallback
 from rig.acquisition.cameras.base import ArmSpec, CameraDevice, CameraSettings
 from rig.acquisition.capture.camerathreads import CameraThread, do_all, outcomes
 from rig.acquisition.capture.collect import Collected, Collector, Want, read_clock
-from rig.acquisition.capture.firing import FATES, CaptureOrder, Fate, Firing, Ready
+from rig.acquisition.capture.firing import FATES, CaptureOrder, Fate, Firing, Ready, file_wait_ns
 from rig.acquisition.station.pulses import arm_request
 from rig.acquisition.station.spec import Interlock, Station
 from rig.acquisition.synchrony.faults import Fault, FaultKind
+from rig.acquisition.synchrony.fileevidence import FileEvidence
+from rig.acquisition.synchrony.fileoutlook import FileOutlook
 from rig.acquisition.synchrony.triggertimes import HostInterval
 from rig.acquisition.trigger.box import ArmRequest, FireOutcome, FireReport, TriggerBox
 
@@ -51,6 +53,8 @@ class CaptureRun:
     may_fire: Callable[[], None]
     unopened: Mapping[str, str] = field(default_factory=dict)
     """Cameras of the station that could not be opened, and why."""
+    files: FileEvidence | None = None
+    """What earlier captures taught of cameras that are only seen through their files."""
     fate: Fate = Fate.NOT_FIRED
     began_ns: int = 0
     """When FIRE was sent, in ns since 1970."""
@@ -220,7 +224,14 @@ class CaptureRun:
             patience_s=policy.frame_deadline_s,
             kinds=plan.kinds,
             ready_stamp=max((sample.device_ns for sample in samples), default=None),
+            outlook=self._outlook(thread),
         )
+
+    def _outlook(self, thread: CameraThread) -> FileOutlook | None:
+        if self.files is None or not thread.device.capabilities.by_files:
+            return None
+        wait_ns = file_wait_ns(self.station.policy, thread.device.capabilities)
+        return self.files.outlook(thread.plan.name, wait_ns, time.time_ns())
 
     def _fire_box(self, request: ArmRequest | None) -> DeviceError | None:
         """Fire; a lost box is no error yet, because what it did is still to be found out."""

@@ -30,6 +30,7 @@ from rig.acquisition.synchrony.fileclocks import (
 )
 from rig.acquisition.synchrony.fileexposures import FileExposure, Span, file_exposures, file_time
 from rig.acquisition.synchrony.filenumbers import FileNumbers
+from rig.acquisition.synchrony.fileoutlook import FileOutlook
 from rig.acquisition.synchrony.heldfiles import hold, own_frames, owners_of, pairings
 from rig.acquisition.synchrony.sharedtimes import SharedTimes
 
@@ -95,6 +96,15 @@ class FileEvidence:
             tags = frame.metadata
             if tags.get("sha256"):
                 self._seen.setdefault(tags["sha256"], tags.get("file", "a file"))
+
+    def outlook(self, camera: str, wait_ns: int, now_ns: int) -> FileOutlook:
+        """What is known of a camera's files, for one that waits for the next of them.
+
+        ``now_ns``: since 1970.
+        """
+        memory = self._of(camera)
+        offset = memory.offset and self._by_now(memory, memory.offset, now_ns)
+        return FileOutlook(offset, memory.outstanding, frozenset(self._seen), wait_ns)
 
     def sort(self, deliveries: Sequence[FileDelivery]) -> dict[str, tuple[Pairing, Pairing | None]]:
         """The pictures of each camera, and the raw files beside them."""
@@ -173,7 +183,10 @@ class FileEvidence:
 
     def _now(self, given: FileDelivery, memory: CameraFiles, offset: Span) -> Span:
         """An offset that was learned, as it may be by now."""
-        drift_ns = round(DRIFT * max(0, given.shots[0].at_ns - memory.known_at_ns))
+        return self._by_now(memory, offset, given.shots[0].at_ns)
+
+    def _by_now(self, memory: CameraFiles, offset: Span, now_ns: int) -> Span:
+        drift_ns = round(DRIFT * max(0, now_ns - memory.known_at_ns))
         return offset.wider(drift_ns, drift_ns)
 
     def _fits(

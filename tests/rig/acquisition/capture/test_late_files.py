@@ -207,3 +207,18 @@ def test_late_pictures_of_an_interrupted_capture_are_not_those_of_the_next(
             record = second(Tethered(rig, session, root))
     assert set(record.missing) == set(CAMERAS)
     assert "an earlier picture has not come" in held(record)
+
+
+def test_the_wait_goes_on_when_a_picture_of_another_time_comes_first(tethered: Tethered) -> None:
+    tethered.capture("one", tethered.sound(1))
+
+    def deliver(fired: datetime) -> None:
+        tethered.write("cam01", "by hand.JPG", fired - timedelta(seconds=30.0))
+        for name in CAMERAS[1:]:
+            tethered.write(name, "DSC_0002.JPG", fired)
+        time.sleep(0.4)  # more than settle_s, within the deadline
+        tethered.write("cam01", "DSC_0002.JPG", fired)
+
+    record = tethered.capture("two", deliver)
+    assert record.state == "complete", record.faults
+    assert {f.metadata["file"] for f in record.frames} == {"DSC_0002.JPG"}

@@ -1,4 +1,4 @@
-"""Files after a miss: who may be believed again, when, and what is said meanwhile."""
+"""Files after a miss: who may be believed again, when, what is said and waited for meanwhile."""
 
 from __future__ import annotations
 
@@ -13,8 +13,10 @@ from rig.acquisition.synchrony.cameraframes import Pairing
 from rig.acquisition.synchrony.faults import FaultKind
 from rig.acquisition.synchrony.fileclocks import FileDelivery, FiredShot
 from rig.acquisition.synchrony.fileevidence import FileEvidence
+from rig.acquisition.synchrony.fileoutlook import FileOutlook
 
 NOON = datetime(2026, 11, 29, 12, tzinfo=UTC)
+NOON_NS = round(NOON.timestamp() * 1e9)
 NAMES = ("left", "middle", "right")
 
 
@@ -192,3 +194,48 @@ def test_a_clock_that_drifts_all_day_stays_known() -> None:
         at = after(120.0 * k)
         own = at + timedelta(seconds=777 + 120.0 * k * 5e-5)
         assert filed(files.capture(at, {"left": own}, names=("left",))) or not k, k
+
+
+def names(outlook: FileOutlook, at: datetime | None, name: str = "a.jpg") -> list[str]:
+    return [f.metadata["file"] for f in outlook.likely([picture(name, at)], [NOON_NS])]
+
+
+@pytest.mark.parametrize(
+    ("off_s", "likely"), [(0.0, True), (3600.0, True), (-5.0, False), (444.0, False)]
+)
+def test_of_an_unknown_clock_what_looks_set_ends_the_wait(off_s: float, likely: bool) -> None:
+    fresh = FileOutlook(None, 0, ())
+    at = NOON + timedelta(seconds=off_s)
+    assert bool(names(fresh, at)) is likely
+    assert not names(replace(fresh, outstanding=1), at)
+
+
+def test_a_file_without_a_time_ends_it_where_nothing_lacks_and_no_clock_is_known() -> None:
+    assert names(FileOutlook(None, 0, ()), None)
+    assert not names(FileOutlook(None, 1, ()), None)
+    assert not names(FileOutlook(None, 0, ("a.jpg None",)), None)
+
+
+def test_a_clock_that_is_known_decides_also_while_an_earlier_picture_lacks() -> None:
+    files = Files()
+    files.capture(after(-90), {"left": after(-90 + 2000)}, names=("left",))
+    files.capture(after(-60), {"left": after(-60 + 2000)}, names=("left",))
+    files.capture(after(-30), {}, names=("left",))
+    outlook = files.evidence.outlook("left", 0, NOON_NS)
+    assert outlook.outstanding
+    assert names(outlook, after(2000))
+    assert not names(outlook, NOON)
+    assert not names(outlook, after(2000 - 30))
+
+
+def test_a_raw_file_that_tells_no_time_goes_with_its_picture() -> None:
+    files = Files()
+    files.capture(after(-30), {"left": after(-30)}, names=("left",))
+    pair = [picture("b.jpg", NOON), picture("b.nef", None, "image/x-nikon-nef")]
+    outlook = files.evidence.outlook("left", 0, NOON_NS)
+    assert len(outlook.likely(pair, [NOON_NS])) == 2
+    assert not names(outlook, None)
+
+
+def test_of_a_camera_that_was_never_seen_nothing_is_known() -> None:
+    assert FileEvidence().outlook("left", 7, NOON_NS).offset is None
