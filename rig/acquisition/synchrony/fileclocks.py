@@ -12,6 +12,11 @@ SLACK_NS = SECOND_NS // 2
 """How far the time in a file may be from the start of its exposure beyond its last digit."""
 NEAR_NS = 3 * SECOND_NS // 2
 """A clock that was set by the computer's is not farther off."""
+AGREED_NS = SLACK_NS // 2
+"""Clocks that were set by one, and say so of one shot, are not farther apart: half of what is
+forgiven one of them."""
+MOST_LEAST = 3
+"""So many clocks at least must agree to speak against another."""
 ZONE_NS = 1800 * SECOND_NS
 WIDEST_ZONE_NS = 14 * 3600 * SECOND_NS
 """A clock that was set to another time zone, or to summer time, is off by whole half hours."""
@@ -98,6 +103,39 @@ def plain_clocks(
         elif offsets:
             told[one.camera] = any(map(is_plain, offsets))
     return told
+
+
+def shared_offset(deliveries: Sequence[FileDelivery]) -> Span | None:
+    """The offset that the clocks of most cameras have by their pictures of one shot.
+
+    None where no three, or no more than half of those that tell a time, agree.
+    """
+    told = []
+    for one in deliveries:
+        times = {file_time(f.metadata) for f in one.frames if not f.metadata.get("known_as")}
+        at = times.pop() if len(times) == 1 else None
+        if at is not None and len(one.shots) == 1:
+            told.append(at.shifted(-one.shots[0].at_ns))
+    groups = [[o for o in told if o.wider(AGREED_NS, AGREED_NS).common(one)] for one in told]
+    most = max(groups, key=len, default=[])
+    if len(most) < MOST_LEAST or 2 * len(most) <= len(told):
+        return None
+    return Span(min(o.low_ns for o in most), max(o.high_ns for o in most))
+
+
+def is_alone(at: Span, shot: FiredShot, shared: Span | None) -> bool:
+    """Whether a clock would be off what most others share, were the picture of the shot."""
+    offset = at.shifted(-shot.at_ns).wider(SLACK_NS, SLACK_NS)
+    return shared is not None and offset.common(shared) is None
+
+
+def alone_words(at: Span, shot: FiredShot) -> str:
+    """Why a picture is held whose clock would be the only one that is off, and what to do."""
+    off_s = (at.low_ns + at.high_ns) / 2e9 - shot.at_ns / 1e9
+    return (
+        f"its time is {off_s:+.1f} s off the shot, and the other cameras' agree: another picture, "
+        "or a clock that is off; set the camera's clock, or take one more capture in this session"
+    )
 
 
 def off_words(at: Span, shot: FiredShot, known: Span | None, fits: bool) -> str:

@@ -21,12 +21,15 @@ from rig.acquisition.synchrony.fileclocks import (
     Clue,
     FileDelivery,
     FiredShot,
+    alone_words,
     clock_offset,
+    is_alone,
     is_plain,
     late_words,
     of_these_days,
     off_words,
     plain_clocks,
+    shared_offset,
 )
 from rig.acquisition.synchrony.fileexposures import FileExposure, Span, file_exposures, file_time
 from rig.acquisition.synchrony.filenumbers import FileNumbers
@@ -64,6 +67,7 @@ class FileEvidence:
         self._seen: dict[str, str] = {}
         self._times = SharedTimes()
         self._plain: dict[str, bool] = {}
+        self._shared: Span | None = None
 
     @property
     def begun(self) -> bool:
@@ -111,6 +115,7 @@ class FileEvidence:
         owners = owners_of(deliveries, {d.camera: self._of(d.camera).serial for d in deliveries})
         known = {d.camera: self._of(d.camera).offset for d in deliveries}
         self._plain = plain_clocks(deliveries, known)
+        self._shared = shared_offset(deliveries)
         self._times.begin(deliveries)
         done = {one.camera: self._sorted(one, owners) for one in deliveries}
         for one in deliveries[:1]:
@@ -249,12 +254,15 @@ class FileEvidence:
         agreed = [s for s in offsets if self._agrees(given, memory, at, s, in_turn)]
         plain = {s: o for s, o in offsets.items() if memory.offset is None and is_plain(o)}
         near = [s for s, o in plain.items() if lone and self._is_set(given, memory, at, s, o)]
+        alone = [s for s in near if is_alone(at, s, self._shared)]
+        near = [s for s in near if s not in alone]
         if agreed or near:
             return agreed or near
         shot, offset = next(iter(offsets.items()))
         stepped = in_turn and memory.offset is not None and not memory.outstanding
         memory.clues = [*memory.clues[-3:], Clue(offset, shot, at, stepped)]
-        why = off_words(at, shot, memory.offset, bool(plain and memory.outstanding))
+        fits = bool(plain and memory.outstanding)
+        why = alone_words(at, shot) if alone else off_words(at, shot, memory.offset, fits)
         hold(given, exposure, why, faults)
         return []
 

@@ -239,3 +239,33 @@ def test_a_raw_file_that_tells_no_time_goes_with_its_picture() -> None:
 
 def test_of_a_camera_that_was_never_seen_nothing_is_known() -> None:
     assert FileEvidence().outlook("left", 7, NOON_NS).offset is None
+
+
+def hundredths(name: str, at: datetime) -> Frame:
+    frame = picture(name, at)
+    said = {**frame.metadata, "SubSecTimeOriginal": f"{at.microsecond // 10_000:02d}"}
+    return replace(frame, metadata=said)
+
+
+def test_a_stray_in_the_first_capture_does_not_set_its_camera_s_clock() -> None:
+    """Of nine clocks eight agree, and the ninth picture was taken 1.2 s before the shot."""
+    evidence = FileEvidence()
+    rig = [f"cam{k}" for k in range(9)]
+
+    def capture(number: int, stray_s: float) -> dict[str, Pairing]:
+        at = after(30.0 * number)
+        shots = (FiredShot(f"c{number}", 1, round(at.timestamp() * 1e9)),)
+        times = {name: at + timedelta(seconds=0.03 * (k % 3)) for k, name in enumerate(rig)}
+        times["cam4"] += timedelta(seconds=stray_s)
+        frames = {name: (hundredths(f"{name}-{number}.jpg", t),) for name, t in times.items()}
+        given = [FileDelivery(name, frames[name], shots, 0) for name in rig]
+        return {name: found[0] for name, found in evidence.sort(given).items()}
+
+    found = capture(1, -1.2)
+    assert filed(found) == set(rig) - {"cam4"}
+    assert "its time is -1.2 s off the shot, and the other cameras' agree" in held(found["cam4"])
+    assert filed(capture(2, 0.0)) == set(rig)
+    # A clock that is off says so twice.
+    evidence = FileEvidence()
+    assert filed(capture(3, -1.2)) == set(rig) - {"cam4"}
+    assert filed(capture(4, -1.2)) == set(rig)
