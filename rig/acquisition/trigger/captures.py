@@ -37,6 +37,9 @@ _OUTPUTS_DIFFER = frozenset({ErrorCode.NOTHING, ErrorCode.EDGES, ErrorCode.RANGE
 _ENDINGS = frozenset({"FIRED", "ABORTED", "EXPIRED", "DISARMED", "FAULT"})
 
 
+RESET = "reset the box (rigwright trigger reset --station STATION.toml)"
+"""How, for whoever reads the message; a service that has the station is asked by that command."""
+
 _REMEDIES: Mapping[int, str] = {
     ErrorCode.BUSY: "wait until it is done, or abort it",
     ErrorCode.ARMED: "abort, then try again",
@@ -370,15 +373,15 @@ class Captures:
             return ConflictError(
                 "trigger-fault",
                 f"the box has stopped for safety ({refused.fields.get('why', 'no reason given')})",
-                "remove the cause, then reset the box",
+                f"remove the cause, then {RESET}",
             )
-        remedy = _REMEDIES.get(refused.code, "reset the box, then try again")
+        remedy = _REMEDIES.get(refused.code, f"{RESET}, then try again")
         return ConflictError("trigger-refused", f"the box does not do it: {refused}", remedy)
 
 
 def _interlock() -> InterlockError:
     return InterlockError(
-        "open", "the interlock of the trigger box is open", "close it, then reset the box"
+        "open", "the interlock of the trigger box is open", f"close it, then {RESET}"
     )
 
 

@@ -8,9 +8,10 @@ from contextlib import contextmanager
 import pytest
 from trigger_boxes import ONE_EACH, fire_whole, opened, request_for, rises, wait_until
 
-from common.errors import ConflictError
+from common.errors import ConflictError, InterlockError
 from rig.acquisition.trigger import protocol
 from rig.acquisition.trigger.box import TriggerState
+from rig.acquisition.trigger.captures import RESET
 from rig.acquisition.trigger.driver import SerialTriggerBox
 from rig.acquisition.trigger.fake import commands
 from rig.acquisition.trigger.fake.device import FakeBox, FakeSettings
@@ -73,7 +74,7 @@ def test_what_the_refusal_names_as_remedy_works(monkeypatch: pytest.MonkeyPatch)
     with start_fake() as fake, opened(fake.url) as driver:
         with pytest.raises(ConflictError, match="260") as caught:
             driver.arm(request_for("a"))
-        assert caught.value.remedy == "reset the box, then try again"
+        assert caught.value.remedy == f"{RESET}, then try again"
         driver.reset()
         fire_whole(driver, "b")
 
@@ -93,3 +94,20 @@ def test_a_box_with_firmware_of_before_is_used_as_it_is(monkeypatch: pytest.Monk
         fake.box.reset()
         fake.server.wake()
         fire_whole(driver, "b")
+
+
+def test_a_box_that_has_stopped_for_safety_says_by_which_command_it_is_reset() -> None:
+    with start_fake() as fake, opened(fake.url) as driver:
+        driver.arm(request_for("a"))
+        fake.box.set_interlock(False)
+        fake.server.wake()
+        wait_until(lambda: driver.health().interlock_closed is False)
+        with pytest.raises(InterlockError) as opened_up:
+            driver.arm(request_for("b"))
+        fake.box.set_interlock(True)
+        fake.server.wake()
+        wait_until(lambda: driver.health().interlock_closed is True)
+        with pytest.raises(ConflictError, match="stopped for safety") as stopped:
+            driver.arm(request_for("c"))
+        for error in (opened_up.value, stopped.value):
+            assert "rigwright trigger reset --station STATION.toml" in error.remedy
