@@ -129,7 +129,8 @@ class FolderCamera:
         self._counts["stale_frames"] += len(came)
         if not self._armed_at_s:
             came = [o for o in mine if o[1].modified_ns / 1e9 > time.time() - RECENT_S]
-        self._between = [self._late(*one) for one in reversed(came[:MOST_BETWEEN])]
+        told = reversed(came[:MOST_BETWEEN])
+        self._between = [self._late(*one, seen_come=bool(self._armed_at_s)) for one in told]
         self._kinds = kinds_of_one(mine)
         self._tells_time = self._told_time(mine)
         self._spec, self._armed_at_s = spec, time.time()
@@ -138,15 +139,24 @@ class FolderCamera:
         self._settling.clear()
         self._doubted.clear()
 
-    def _late(self, path: Path, stamp: Stamp) -> Frame:
-        """A file of before the camera was armed, without its content."""
+    def _late(self, path: Path, stamp: Stamp, *, seen_come: bool) -> Frame:
+        """A file of before the camera was armed, without its content.
+
+        Of one that was not seen to come only the time of writing tells since when it is there.
+        """
+        written = {} if seen_come else {"written_ns": str(stamp.modified_ns)}
         return Frame(
             camera_id=self._info.id,
             arrived_host_ns=time.monotonic_ns(),
             status=FrameStatus.OK,
             encoded=b"",
             media_type=MEDIA_TYPES[path.suffix.lower()],
-            metadata={**self._tags(path, stamp), "file": as_text(path.name), "path": as_text(path)},
+            metadata={
+                **self._tags(path, stamp),
+                "file": as_text(path.name),
+                "path": as_text(path),
+                **written,
+            },
         )
 
     def _tags(self, path: Path, stamp: Stamp) -> Mapping[str, str]:

@@ -40,6 +40,9 @@ from rig.acquisition.synchrony.sharedtimes import SharedTimes
 REMEMBERED = 500
 """Shots against which a late picture is held."""
 
+WRITTEN_SLACK_NS = 2_000_000_000
+"""Disks of cameras (FAT) tell when a file was written in steps of two seconds."""
+
 
 @dataclass
 class CameraFiles:
@@ -68,6 +71,7 @@ class FileEvidence:
         self._times = SharedTimes()
         self._plain: dict[str, bool] = {}
         self._shared: Span | None = None
+        self._filed: set[tuple[str, str, str]] = set()
 
     @property
     def begun(self) -> bool:
@@ -161,12 +165,20 @@ class FileEvidence:
         stems = {PurePath(name).stem.casefold() for name in memory.filed}
         for frame in given.between:
             exposure = FileExposure((frame,), file_time(frame.metadata))
-            if frame.metadata.get("path", "") in memory.filed or not self._shots:
+            if not self._shots or self._is_known(frame, memory):
                 continue
             if PurePath(exposure.name).stem.casefold() in stems:
                 hold(given, exposure, late_words(memory.filed_in), faults)
             elif memory.outstanding:
                 self._came_too_late(given, memory, exposure, faults)
+
+    def _is_known(self, frame: Frame, memory: CameraFiles) -> bool:
+        """Whether a file had its place already, or lay there before the last capture was fired."""
+        tags = frame.metadata
+        if tags.get("path", "") in memory.filed or _place(frame) in self._filed:
+            return True
+        written_ns = int(tags.get("written_ns", self._shots[-1].at_ns))
+        return written_ns < self._shots[-1].at_ns - WRITTEN_SLACK_NS
 
     def _came_too_late(
         self, given: FileDelivery, memory: CameraFiles, exposure: FileExposure, faults: list[Fault]
@@ -349,8 +361,16 @@ class FileEvidence:
         if found:
             memory.filed_in = given.shots[0].capture_id
             filed = [f for exposure, _ in found.values() for f in exposure.frames]
+            self._filed |= {_place(frame) for frame in filed}
             memory.filed = tuple(f.metadata.get("path", f.metadata.get("file", "")) for f in filed)
         memory.numbers.capture_ends([found[k][0].name for k in sorted(found)])
+
+
+def _place(frame: Frame) -> tuple[str, str, str]:
+    """Where a file lay and when it was taken: programs use names again."""
+    tags = frame.metadata
+    moment = tags.get("DateTimeOriginal", ""), tags.get("SubSecTimeOriginal", "")
+    return tags.get("path", tags.get("file", "")), *moment
 
 
 def _untimed(

@@ -222,3 +222,32 @@ def test_the_wait_goes_on_when_a_picture_of_another_time_comes_first(tethered: T
     record = tethered.capture("two", deliver)
     assert record.state == "complete", record.faults
     assert {f.metadata["file"] for f in record.frames} == {"DSC_0002.JPG"}
+
+
+def test_a_program_that_starts_anew_tells_no_file_that_was_filed_or_lay_there(
+    tmp_path: Path,
+) -> None:
+    """After a partial capture every young file was told as one that had come after it."""
+    root, folder = tmp_path / "tether", tmp_path / "session"
+    made = station(root)
+    old = root / "cam01" / "by hand.JPG"
+    old.write_bytes(jpeg(datetime.now(), 1000))
+    before_s = time.time() - 60.0
+    os.utime(old, (before_s, before_s))
+    with open_station(made, locks=tmp_path / "locks") as rig, rig.new_session(folder) as session:
+        tethered = Tethered(rig, session, root)
+        tethered.capture("one", tethered.sound(1))
+        tethered.capture("two", tethered.sound(2))
+
+        def partial(fired: datetime) -> None:
+            for name in CAMERAS[1:]:
+                tethered.write(name, "DSC_0003.JPG", fired)
+
+        assert tethered.capture("three", partial).missing == {"cam01": [1]}
+    late = root / "cam01" / "DSC_0003.JPG"
+    late.write_bytes(jpeg(datetime.now(), 1001))
+    with open_station(made, locks=tmp_path / "locks") as rig, Session.open(folder) as session:
+        tethered = Tethered(rig, session, root)
+        tethered.seed = 2000
+        record = tethered.capture("four", tethered.sound(4))
+    assert held(record).count("is held back") == held(record).count("DSC_0003.JPG") == 1
