@@ -7,7 +7,7 @@ still: the target set of ``rigwright practice``, where the subject will be.
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -48,7 +48,7 @@ def calibrated(
     plan = targets_from(practice_files()["targets.toml"].decode())
     with tempfile.TemporaryDirectory() as folder:
         studio = Studio(cameras, _scene(plan, centre_mm, Path(folder)))
-        taken = [
+        pictures = [
             TakenPicture(
                 name,
                 f"{capture:03d}",
@@ -67,7 +67,7 @@ def calibrated(
             for capture in range(captures)
             for number, name in enumerate(studio.cameras)
         ]
-    seen = detect_pictures(taken, plan)
+    seen = detect_pictures(pictures, plan)
     start = tuple(CalibratedCamera.from_rig(camera) for camera in cameras)
     done = calibrate(seen.observations, CalibrationOptions(start=start))
     return rig_cameras(done.cameras, cameras), done
@@ -75,16 +75,22 @@ def calibrated(
 
 def photographed(studio: Studio, shot: Shot, kept: Path | None) -> NDArray[np.uint8]:
     """A photograph, from the folder of kept ones where it is there."""
-    if kept is None:
-        return np.asarray(studio.photograph(shot), dtype=np.uint8)
     width, height = studio.cameras[shot.camera].camera.image_size_px
     seed = "-".join(str(part) for part in shot.seed)
-    file = kept / f"{shot.camera}-{shot.pixel_format}-{seed}-{width}x{height}.npy"
+    file = f"{shot.camera}-{shot.pixel_format}-{seed}-{width}x{height}.npy"
+    return taken(kept, file, lambda: np.asarray(studio.photograph(shot), dtype=np.uint8))
+
+
+def taken(kept: Path | None, name: str, take: Callable[[], NDArray[np.uint8]]) -> NDArray[np.uint8]:
+    """The picture of that name in the folder ``kept``, or what ``take`` takes, kept there."""
+    if kept is None:
+        return take()
+    file = kept / name
     if not file.exists():
         kept.mkdir(parents=True, exist_ok=True)
         # Whole or not at all: whoever is stopped goes on where they were.
         begun = file.with_suffix(".begun.npy")
-        np.save(begun, studio.photograph(shot))
+        np.save(begun, take())
         begun.rename(file)
     return np.asarray(np.load(file))
 

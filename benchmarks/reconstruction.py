@@ -6,9 +6,10 @@ takes the cameras of ``--design DESIGN.json``; without a head the bundled one is
 known but found from captures of targets that the same simulated cameras took; that cloud is put
 onto the head by best fit (rigid, no scale). With ``--blender PROGRAM`` (Blender, or a Python with
 its module ``bpy``) there is a column for pictures of the same rig that Blender rendered, with
-``--samples`` rays a pixel. ``--half`` halves the pictures, ``--stride`` is the
-pixels between points. ``--kept FOLDER`` keeps
-pictures there, and takes those that are there already: of the same design, head and studio only.
+``--samples`` rays a pixel. With ``--strip`` there is a column for as many of the same cameras side
+by side, in the conventional strip that suits the head best. ``--half`` halves the pictures,
+``--stride`` is the pixels between points. ``--kept FOLDER`` keeps pictures there, and takes those
+that are there already: of the same design, head and studio only.
 """
 
 from __future__ import annotations
@@ -16,14 +17,17 @@ from __future__ import annotations
 import argparse
 import resource
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
-from benchmarks.calibrated_cameras import calibrated, photographed
+from benchmarks.calibrated_cameras import calibrated, photographed, taken
 from benchmarks.pages import table
+from benchmarks.strips import strip_beside
 from evaluation.comparison.alignment import best_fit
 from evaluation.comparison.distances import Reference
 from evaluation.reconstruction.reconstructing import (
@@ -47,9 +51,8 @@ RADIUS_MM = 95.0
 def main() -> None:
     """Photograph, reconstruct, compare, print."""
     chosen = _chosen()
-    cameras: tuple[RigCamera, ...] = read_design(chosen.design).cameras
-    if chosen.half:
-        cameras = tuple(halved(camera) for camera in cameras)
+    designed: tuple[RigCamera, ...] = read_design(chosen.design).cameras
+    cameras = sized(designed, half=chosen.half)
     studio = Studio(cameras, SceneSettings(head=head_of(chosen)))
     images = photographs(studio, chosen.kept)
     if studio.surface is None:
@@ -57,18 +60,26 @@ def main() -> None:
     truth = Reference(studio.surface.vertices_mm, studio.surface.faces)
     options = ReconstructionOptions(stride_px=chosen.stride)
     known = figures_of(images, cameras, cameras, truth, options)
-    columns = {"value": known}
+    columns = {"known cameras": known}
     if chosen.calibrated:
         found = _calibrated(cameras, images, chosen.captures, chosen.kept)
-        columns = {
-            "known cameras": known,
-            "calibrated": figures_of(images, found, cameras, truth, options, fit=True),
-        }
+        columns["calibrated"] = figures_of(images, found, cameras, truth, options, fit=True)
+    if chosen.strip:
+        strip = sized(strip_beside(designed, chosen.head), half=chosen.half)
+        # The cameras of both are called alike.
+        kept = None if chosen.kept is None else chosen.kept / "strip"
+        side_by_side = photographs(Studio(strip, studio.scene), kept)
+        columns["strip"] = figures_of(side_by_side, strip, strip, truth, options)
     if chosen.blender is not None:
         blender = BlenderPhotographer(chosen.blender, chosen.samples)
         other = rendered_by_blender(studio, blender, chosen.kept)
         columns["by Blender"] = figures_of(other, cameras, cameras, truth, options)
-    rows = [(name, *(column[name] for column in columns.values())) for name in known]
+    _print(columns)
+
+
+def _print(columns: Mapping[str, Mapping[str, str]]) -> None:
+    names = next(iter(columns.values()))
+    rows = [(name, *(column[name] for column in columns.values())) for name in names]
     print(table(("figure", *columns), rows))
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     print(f"\npeak memory, photographing included: {peak:.0f} MiB")
@@ -78,6 +89,7 @@ def _chosen() -> argparse.Namespace:
     parser = sized_arguments(__doc__)
     parser.add_argument("--calibrated", action="store_true")
     parser.add_argument("--captures", type=int, default=12)
+    parser.add_argument("--strip", action="store_true")
     parser.add_argument("--blender", metavar="PROGRAM")
     parser.add_argument("--samples", type=int, default=BlenderPhotographer().samples)
     return parser.parse_args()
@@ -95,20 +107,17 @@ def rendered_by_blender(
     studio: Studio, blender: BlenderPhotographer, kept: Path | None
 ) -> list[Coded]:
     """The head as Blender shows it to each camera."""
-    found = []
+    found: list[Coded] = []
     for number, name in enumerate(studio.cameras):
+        shot = Shot(name, EXPOSURE_US, seed=(1, number))
         width, height = studio.cameras[name].camera.image_size_px
-        kind = f"blender-{blender.samples}-{width}x{height}"
-        file = None if kept is None else kept / f"{name}-{kind}.npy"
-        if file is None or not file.exists():
-            shot = Shot(name, EXPOSURE_US, seed=(1, number))
-            picture = blender(studio, [shot])[0]
-            if file is not None:
-                np.save(file, picture)
-        else:
-            picture = np.load(file)
-        found.append(np.asarray(picture, dtype=np.uint8))
+        file = f"{name}-blender-{blender.samples}-{width}x{height}.npy"
+        found.append(taken(kept, file, partial(_rendered, blender, studio, shot)))
     return found
+
+
+def _rendered(blender: BlenderPhotographer, studio: Studio, shot: Shot) -> NDArray[np.uint8]:
+    return np.asarray(blender(studio, [shot])[0], dtype=np.uint8)
 
 
 def figures_of(
@@ -165,6 +174,11 @@ def head_of(chosen: argparse.Namespace) -> HeadSettings:
         flip_texture=chosen.head is not None,
         subdivisions=2 if chosen.head is not None else 1,
     )
+
+
+def sized(cameras: Sequence[RigCamera], *, half: bool) -> tuple[RigCamera, ...]:
+    """The cameras as they are, or all of them halved."""
+    return tuple(halved(camera) if half else camera for camera in cameras)
 
 
 def halved(camera: RigCamera) -> RigCamera:
