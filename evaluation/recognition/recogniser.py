@@ -92,6 +92,8 @@ class Recogniser:
     def scores(self, enrolled: Sequence[Template], probes: Sequence[Template]) -> Floats:
         """Share of the regions that call each pair one person, (n, m); NaN where too few speak."""
         votes = np.zeros((len(enrolled), len(probes)))
+        if not votes.size:
+            return votes
         voters = np.zeros(votes.shape)
         parts = self._parts(enrolled), self._parts(probes)
         for k, (classifier, least) in enumerate(

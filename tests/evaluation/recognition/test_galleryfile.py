@@ -128,3 +128,9 @@ def test_an_archive_that_unpacks_too_large_is_refused(
     monkeypatch.setattr(galleryfile, "LARGEST_BYTES", 100_000)
     with pytest.raises(InputError, match="unpacks to more than"):
         read_gallery(tmp_path / "g.npz")
+
+
+def test_against_nobody_there_is_nothing_to_score(filled: Gallery) -> None:
+    templates = list(filled.persons.values())
+    assert filled.recogniser.scores(templates, []).shape == (2, 0)
+    assert filled.recogniser.scores([], templates).shape == (0, 2)
