@@ -5,9 +5,10 @@
         [--out PAGE]
 
 ``--model`` is the compact ICT face model; without it the persons are the bundled generator's.
-``--designs`` holds design files with different numbers of cameras; without it rigs are designed
-here. A few captures are simulated and reconstructed in full: they set noise and losses of the
-error model that all other probes are drawn from, and show that it is right.
+``--designs`` holds design files with different numbers of cameras, for any head; without it rigs
+are designed here, for the bundled one. A few captures are simulated and reconstructed in full: they
+set noise and losses of the error model that all other probes are drawn from, and show that it is
+right.
 """
 
 from __future__ import annotations
@@ -21,7 +22,14 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.full_captures import FullCapture, full_capture, lights_of
-from benchmarks.measured_faces import GeneratedPersons, IctPersons, Light, measured, sight_of
+from benchmarks.measured_faces import (
+    TIP_MM,
+    GeneratedPersons,
+    IctPersons,
+    Light,
+    measured,
+    sight_of,
+)
 from benchmarks.recognition_page import Row, page
 from common.errors import InputError
 from evaluation.recognition.faces import registered
@@ -31,7 +39,7 @@ from geometry.arrays import Floats
 from geometry.camera import RigCamera
 from geometry.head import synthetic_head
 from geometry.preparation import prepare_subject
-from rig.design.designfile import read_design
+from rig.design.designfile import ReadDesign, read_design
 from rig.specification.examples import example_rig
 from solver.design import design
 
@@ -58,7 +66,7 @@ class Probe:
 def rigs(folder: Path | None) -> dict[int, tuple[RigCamera, ...]]:
     """Rigs by their number of cameras."""
     if folder is not None:
-        read = [read_design(path).cameras for path in sorted(folder.glob("*.json"))]
+        read = [_about_the_nose(read_design(path)) for path in sorted(folder.glob("*.json"))]
         return {len(cameras): cameras for cameras in read}
     spec = example_rig("face")
     prepared = prepare_subject(synthetic_head(), replace(spec.subject_options, seed=spec.seed))
@@ -68,6 +76,16 @@ def rigs(folder: Path | None) -> dict[int, tuple[RigCamera, ...]]:
         ).cameras
         for count in COUNTS
     }
+
+
+def _about_the_nose(read: ReadDesign) -> tuple[RigCamera, ...]:
+    """The cameras, moved so that the foremost point of their subject is where noses will be."""
+    points = np.asarray(read.file.points.position_mm)
+    way = TIP_MM - points[np.argmin(points[:, 1])]
+    return tuple(
+        replace(c, pose=replace(c.pose, position_rig_mm=c.pose.position_rig_mm + way))
+        for c in read.cameras
+    )
 
 
 def found(points_mm: Floats, tip_mm: Floats, rng: np.random.Generator) -> Floats:
@@ -205,9 +223,9 @@ def main() -> None:
         if template is not None and capture.person in gallery:
             score = float(model.scores([gallery[capture.person]], [template])[0, 0])
         checks.append((capture, score))
-    text = page(
-        rows, checks, lights, model, len(gallery), _command(chosen), time.process_time() - begin
-    )
+    seconds = time.process_time() - begin
+    sizes = (len(gallery), chosen.persons)
+    text = page(rows, checks, lights, model, *sizes, _command(chosen), seconds)
     print(text)
     if chosen.out:
         chosen.out.write_text(text, encoding="utf-8")

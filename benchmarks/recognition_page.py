@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -74,7 +75,8 @@ class Row:
             g = np.concatenate([own[k] for k in pick])
             i = np.concatenate([by_person[k] for k in pick])
             if not len(i):
-                return [np.nan] * 4
+                # All were refused: nobody is recognised, and nobody taken for another.
+                return [np.nan, float((g <= threshold).mean()), np.nan, np.nan]
             strict = threshold_at(i, 0.001)
             return [
                 equal_error(g, i),
@@ -86,7 +88,9 @@ class Row:
         rng = np.random.default_rng(0)
         middle = figures(np.arange(len(people)))
         drawn = [figures(rng.integers(len(people), size=len(people))) for _ in range(DRAWS)]
-        low, high = np.nanquantile(np.array(drawn), [0.025, 0.975], axis=0)
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", "All-NaN")
+            low, high = np.nanquantile(np.array(drawn), [0.025, 0.975], axis=0)
         all_ = [(m, float(a), float(b)) for m, a, b in zip(middle, low, high, strict=True)]
         return cls(rig, light, probes, refused, *all_)
 
@@ -94,9 +98,15 @@ class Row:
     def line(self) -> str:
         """One line of the table."""
         values = (self.equal_error, self.missed, self.matched, self.missed_at_1000)
-        cells = " | ".join(f"{100 * m:.2f} ({100 * a:.2f} to {100 * b:.2f})" for m, a, b in values)
+        cells = " | ".join(_bounded(*value) for value in values)
         light = NAMES[self.light]
         return f"| {self.rig} | {light} | {self.probes} | {self.refused} | {cells} |"
+
+
+def _bounded(value: float, low: float, high: float) -> str:
+    if np.isnan(value):
+        return "-"
+    return f"{100 * value:.2f} ({100 * low:.2f} to {100 * high:.2f})"
 
 
 def page(
@@ -105,6 +115,7 @@ def page(
     lights: Sequence[Light],
     model: Recogniser,
     enrolled: int,
+    persons: int,
     command: str,
     seconds: float,
 ) -> str:
@@ -116,9 +127,10 @@ def page(
     lines = [
         *("# Does the data of a rig suffice to recognise a person?", ""),
         f"Written by `{command}`,",
-        f"{seconds:.0f} s of processor time. Persons of {whose}; {enrolled} are",
-        "enrolled from one scan without error, at rest, and probed as rigs would measure them, in",
-        "another place, every second with an expression. The model saw none of them. How",
+        f"{seconds:.0f} s of processor time. Persons of {whose}. {enrolled} of",
+        f"{persons} are enrolled from one scan without error, at rest (of the others the program",
+        "is not certain how their faces stand, and refuses them), and probed as rigs would measure",
+        "them, in another place, every second with an expression. The model saw none of them. How",
         "recognition works: [recognise.md](../how-to/recognise.md).",
         "",
         "On persons left out of the training, on scans without error: equal error rate",
