@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import fcntl
 import http.server
 import importlib.util
 import os
@@ -15,9 +16,10 @@ import shutil
 import signal
 import struct
 import subprocess
+import tempfile
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -100,6 +102,14 @@ def crash(device: CameraDevice) -> None:
     assert isinstance(device, RemoteCamera)
     assert device.worker_pid
     os.kill(device.worker_pid, signal.SIGKILL)
+
+
+@contextlib.contextmanager
+def one_gige_network() -> Iterator[None]:
+    """Fake GigE cameras all answer on one network: tests side by side would find each other's."""
+    with (Path(tempfile.gettempdir()) / "rigwright-tests-gige.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
 
 
 class FakeGigE:

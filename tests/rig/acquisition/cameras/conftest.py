@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import fcntl
 import importlib.util
 import shutil
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from camera_rigs import FAKE_GV, RIGS, CameraRig
+from camera_rigs import FAKE_GV, RIGS, CameraRig, one_gige_network
 
 from common.errors import DeviceError
 from rig.acquisition.cameras.aravis import find_python
@@ -53,12 +51,10 @@ def worlds() -> list[object]:
 
 @pytest.fixture(scope="module", autouse=True)
 def _one_gige_network_at_a_time(request: pytest.FixtureRequest) -> Iterator[None]:
-    """Fake GigE cameras all answer on one network: tests side by side would find each other's."""
-    if not request.module.__name__.rpartition(".")[2].startswith(("test_aravis", "test_conf")):
-        yield
-        return
-    with (Path(tempfile.gettempdir()) / "rigwright-tests-gige.lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
+    if request.module.__name__.rpartition(".")[2].startswith(("test_aravis", "test_conf")):
+        with one_gige_network():
+            yield
+    else:
         yield
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from camera_rigs import FAKE_GV, FakeGigE
+from camera_rigs import FAKE_GV, FakeGigE, one_gige_network
 from memoryrig import with_policy
 
 from common.errors import DeviceError
@@ -44,13 +44,14 @@ def station(files: Path) -> Station:
 def cameras(tmp_path: Path, lost_per_1000: int) -> Iterator[tuple[Rig, FakeGigE]]:
     if shutil.which(FAKE_GV) is None:
         pytest.skip("no fake camera")
-    bad = FakeGigE("LOSSY", lost_per_1000=lost_per_1000)
-    try:
-        (tmp_path / "files").mkdir()
-        with open_station(station(tmp_path / "files"), locks=tmp_path / "locks") as rig:
-            yield rig, bad
-    finally:
-        bad.stop()
+    with one_gige_network():
+        bad = FakeGigE("LOSSY", lost_per_1000=lost_per_1000)
+        try:
+            (tmp_path / "files").mkdir()
+            with open_station(station(tmp_path / "files"), locks=tmp_path / "locks") as rig:
+                yield rig, bad
+        finally:
+            bad.stop()
 
 
 def test_lost_packets_cost_their_camera_only(tmp_path: Path) -> None:
