@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 import subprocess
 import tempfile
+import threading
+import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -31,6 +33,8 @@ _INSIDE = Path(__file__).with_name("inside.py")
 _TOLD = "rendered "
 _WORDS = 300
 """Letters of Blender's last words that an error repeats."""
+
+_LOOK_S = 0.05
 
 
 @dataclass(frozen=True)
@@ -102,19 +106,28 @@ def _rendered(program: str, folder: Path, cancel: CancelToken) -> Iterator[str]:
     """Names of cameras as their pictures are there."""
     last = ""
     with _process(_command(program, folder), _environment()) as process:
+        # Blender may say nothing for minutes, so nobody who reads it would hear of a cancel.
+        threading.Thread(target=_end_when_told, args=(process, cancel), daemon=True).start()
         for line in process.stdout or ():
-            go_on(cancel)
             if line.startswith(_TOLD):
                 yield line.removeprefix(_TOLD).strip()
             elif line.strip() and not line.startswith(("Fra:", "Saved:", "Time:")):
                 last = line.strip()
         code = process.wait()
+    go_on(cancel)
     if code != 0:
         raise InputError(
             "blender-failed",
             f"Blender ended with code {code}: {last[-_WORDS:] or 'it said nothing'}",
             f"see whether {program} is Blender 4.2 or newer, or a Python with bpy",
         )
+
+
+def _end_when_told(process: subprocess.Popen[str], cancel: CancelToken) -> None:
+    while process.poll() is None:
+        if cancel.is_set():
+            process.kill()
+        time.sleep(_LOOK_S)
 
 
 def _environment() -> Mapping[str, str]:

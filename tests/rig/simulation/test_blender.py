@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -72,16 +73,23 @@ def test_a_program_that_is_not_there_or_fails_is_told(studio: Studio, tmp_path: 
         BlenderPhotographer(program(tmp_path, "echo hello"))(studio, shots(studio))
 
 
-class Stopped:
+class Told:
+    """Told to stop once the program has begun."""
+
+    def __init__(self, mark: Path) -> None:
+        self._mark = mark
+
     def is_set(self) -> bool:
-        return True
+        return self._mark.exists() and bool(self._mark.read_text())
 
 
 def test_it_stops_at_once_and_leaves_no_program(studio: Studio, tmp_path: Path) -> None:
     mark = tmp_path / "pid"
-    slow = program(tmp_path, f"echo $$ > {mark}; while true; do echo waiting; sleep 0.1; done")
+    silent = program(tmp_path, f"echo $$ > {mark}; exec sleep 60")
+    began = time.monotonic()
     with pytest.raises(CancelledError):
-        BlenderPhotographer(slow)(studio, shots(studio), cancel=Stopped())
+        BlenderPhotographer(silent)(studio, shots(studio), cancel=Told(mark))
+    assert time.monotonic() - began < 30.0  # half of what the program would sleep
     with pytest.raises(ProcessLookupError):
         os.kill(int(mark.read_text()), 0)
 

@@ -6,7 +6,7 @@ import hashlib
 import os
 import shutil
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from datetime import datetime, timedelta
 from io import BytesIO
@@ -25,15 +25,6 @@ from rig.acquisition.session.verify import verify_session
 from rig.acquisition.station.spec import CameraPlan
 from rig.acquisition.synchrony.fileevidence import FileEvidence
 from rig.devices.station import open_station
-
-
-@pytest.fixture
-def tethered(tmp_path: Path) -> Iterator[Tethered]:
-    root = tmp_path / "tether"
-    with open_station(station(root), locks=tmp_path / "locks") as rig:
-        session = rig.new_session(tmp_path / "session")
-        with session:
-            yield Tethered(rig, session, root)
 
 
 def test_sound_pictures_are_given_by_their_times(tethered: Tethered) -> None:

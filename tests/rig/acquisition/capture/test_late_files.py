@@ -6,7 +6,6 @@ import os
 import shutil
 import threading
 import time
-from collections.abc import Iterator
 from datetime import datetime, timedelta
 from io import BytesIO
 from pathlib import Path
@@ -22,15 +21,6 @@ from rig.acquisition.session.records import CaptureRecord
 from rig.acquisition.session.staging import Stage
 from rig.acquisition.session.verify import verify_session
 from rig.devices.station import open_station
-
-
-@pytest.fixture
-def tethered(tmp_path: Path) -> Iterator[Tethered]:
-    root = tmp_path / "tether"
-    with open_station(station(root), locks=tmp_path / "locks") as rig:
-        session = rig.new_session(tmp_path / "session")
-        with session:
-            yield Tethered(rig, session, root)
 
 
 def told(record: CaptureRecord, kind: str) -> str:
