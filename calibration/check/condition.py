@@ -40,6 +40,9 @@ ENOUGH = 20
 a smaller share is told."""
 
 
+ALONE = "shows nothing that another camera sees"
+
+
 @dataclass(frozen=True, eq=False)
 class Condition:
     """What is wrong with pictures, and which observations (n,) may take part in a check.
@@ -130,7 +133,8 @@ def _tied(observations: Observations, found: list[Finding], keep: Bools) -> Cond
     names = tuple(observations.cameras[k] for k in sorted(alone))
     names = tuple(name for name in names if name not in blamed)
     if names:
-        found = [Finding(Kind.CANNOT_TELL, names, messages.alone(names)), *found]
+        alone_found = Finding(Kind.CANNOT_TELL, names, messages.alone(names), state=ALONE)
+        found = [alone_found, *found]
     return Condition(tuple(found), kept & ~_floating(observations, kept), checkable)
 
 

@@ -18,7 +18,6 @@ from geometry.arrays import Floats
 URAD = 1e6
 MICROMETRE = 1e3
 
-
 PARALLEL = 1e-6
 """Least over largest weight of a point; rays a milliradian apart meet in a point of that."""
 

@@ -87,8 +87,8 @@ def _without_strange(
     told: tuple[Finding, ...] = ()
     for _ in epoch.camera_names:
         strange, keep = strange_pictures(epoch, agreeing(epoch, start)[0])
-        if not strange:
-            strange, keep = strange_pictures(epoch, placed_by_pairs(epoch, start))
+        if not strange and (placed := placed_by_pairs(epoch, start)) is not start:
+            strange, keep = strange_pictures(epoch, placed)
         if not strange:
             break
         told += strange

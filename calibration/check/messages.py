@@ -45,7 +45,7 @@ def missing(cameras: tuple[str, ...]) -> str:
 def unseeing(camera: str, problem: str, remedy: str) -> str:
     """A camera in whose pictures nothing can be read, and why."""
     own = problem.removeprefix("it ")
-    told = f"{own}" if own != problem else f"shows no target: {problem}"
+    told = own if own != problem else f"shows no target: {problem}"
     return f"Camera {camera} {told}; {remedy}, then check again."
 
 

@@ -30,14 +30,24 @@ def placed_by_pairs(epoch: Epoch, start: Consensus) -> Consensus:
     if not doubtful.any():
         return start
     best, count = start, _count(epoch, fits)
-    seeing = np.unique(epoch.camera[np.isin(epoch.place, np.flatnonzero(doubtful))])
-    for pair in itertools.islice(itertools.combinations(seeing.tolist(), 2), MOST_PAIRS):
+    for pair in _pairs(epoch, doubtful):
         found = consensus(epoch, among=np.array(pair))
         more = _count(epoch, _fits(epoch, found))
         # A place that one camera alone gives fits that camera whatever it shows.
         better = doubtful & np.isfinite(found.scale) & (more > count)
         best, count = _with_places(best, found, better, epoch), np.where(better, more, count)
     return best
+
+
+def _pairs(epoch: Epoch, doubtful: Bools) -> list[tuple[int, int]]:
+    """Pairs of cameras, those first that see most of the doubtful places together."""
+    sees = np.zeros((len(epoch.camera_names), len(doubtful)), bool)
+    sees[epoch.camera, epoch.place] = doubtful[epoch.place]
+    both = sees.astype(np.int64) @ sees.T.astype(np.int64)
+    pairs = [p for p in itertools.combinations(range(len(sees)), 2) if both[p]]
+    # Of pairs that see as much those of the first cameras would be tried alone.
+    order = np.random.default_rng(0).permutation(len(pairs))
+    return sorted((pairs[k] for k in order), key=lambda pair: -both[pair])[:MOST_PAIRS]
 
 
 def _fits(epoch: Epoch, found: Consensus) -> Bools:

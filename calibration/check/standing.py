@@ -77,7 +77,7 @@ LOST = Kind.TARGETS_LOST
 
 
 def _unchecked(before: Finding, points: int) -> Standing:
-    if before.kind is Kind.CANNOT_TELL:
+    if before.kind is Kind.CANNOT_TELL and not before.state:
         return _untold(_too_few(points))
     return _untold(f"not checked: {before.state or LEFT_OUT.get(before.kind, UNSAID)}")
 

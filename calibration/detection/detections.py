@@ -17,7 +17,8 @@ but lenses, paper and sensors are not even to much better than that."""
 class PictureProblem:
     """Something about the whole picture that explains why targets are missing.
 
-    ``code`` is a stable slug: mirrored, legacy, swapped, other-board, inverted, dictionary.
+    ``code`` is a stable slug: mirrored, legacy, swapped, other-board, inverted, dictionary, dark,
+    bright, soft, unpaired, none.
     """
 
     code: str

@@ -58,4 +58,6 @@ def _blur_px(picture: Picture) -> float:
     across = np.abs(smooth[:, 2:] - smooth[:, :-2]) / 2.0
     down = np.abs(smooth[2:] - smooth[:-2]) / 2.0
     slope = max(float(np.percentile(side, 99.9)) for side in (across, down))
+    if slope <= 0.0:  # edges in fewer pixels than the percentile leaves out
+        return 0.0
     return float(high - low) / (slope * float(np.sqrt(2.0 * np.pi)))

@@ -160,7 +160,8 @@ def detect_pictures(
     require_opencv()
     jobs = [DetectionJob(picture, plan, gates) for picture in pictures]
     found: list[Detections] = []
-    for number, result in enumerate(_results(jobs, cancel or NeverCancelled(), executor), 1):
+    stop = cancel or NeverCancelled()
+    for number, result in enumerate(_results(jobs, stop, executor), 1):
         _check_size(pictures, found, result)
         found.append(result)
         progress(Progress("finding targets", number / len(jobs), iteration=number))
@@ -169,7 +170,7 @@ def detect_pictures(
         Look(p.camera, d, replace(j, explain=True))
         for p, d, j in zip(pictures, found, jobs, strict=True)
     ]
-    problems = unseeing(looks, plan) | problems
+    problems = unseeing(looks, plan, leave_out, stop) | problems
     _refuse(pictures, problems, leave_out)
     rows = [k for k, p in enumerate(pictures) if p.camera not in problems]
     observations = _observations([pictures[k] for k in rows], [found[k] for k in rows], plan)

@@ -10,6 +10,7 @@ from enum import StrEnum
 from calibration.detection.detections import Detections, PictureProblem
 from calibration.detection.diagnosis import FEW
 from calibration.targets.kinds import TargetPlan
+from common.progress import CancelToken, go_on
 
 UNPAIRED = "unpaired"
 MIRRORED = "mirrored"
@@ -60,15 +61,23 @@ def unpaired(frames: Mapping[str, frozenset[str]]) -> dict[str, PictureProblem]:
     return out
 
 
-def unseeing(looks: Sequence[Look], plan: TargetPlan) -> dict[str, PictureProblem]:
-    """Cameras that show no target, or see them in a mirror, and why."""
+def unseeing(
+    looks: Sequence[Look], plan: TargetPlan, leave_out: LeaveOut, cancel: CancelToken
+) -> dict[str, PictureProblem]:
+    """Cameras that show no target, or see them in a mirror, and why.
+
+    Ends with the first that is not left out. Raises :class:`CancelledError` when told to stop.
+    """
     out: dict[str, PictureProblem] = {}
     for camera in dict.fromkeys(look.camera for look in looks):
         mine = [look for look in looks if look.camera == camera]
+        go_on(cancel)
         best = max(mine, key=lambda look: len(look.found))
-        problem = _mirrored(best, plan) if len(best.found) else _nothing(mine, plan)
+        problem = _mirrored(best, plan) if len(best.found) else _nothing(mine, plan, cancel)
         if problem is not None:
             out[camera] = problem
+            if not leave_out.leaves(problem):
+                break
     return out
 
 
@@ -79,9 +88,10 @@ def _mirrored(best: Look, plan: TargetPlan) -> PictureProblem | None:
     return next((f for f in best.explain().findings if f.code == MIRRORED), None)
 
 
-def _nothing(mine: Sequence[Look], plan: TargetPlan) -> PictureProblem:
+def _nothing(mine: Sequence[Look], plan: TargetPlan, cancel: CancelToken) -> PictureProblem:
     # A picture with rejections shows more than one without, and explains better.
     for look in sorted(mine, key=lambda look: -len(look.found.rejections))[:_EXPLAINED]:
+        go_on(cancel)
         findings = look.explain().findings
         if findings:
             return findings[0]

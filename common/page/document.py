@@ -56,7 +56,7 @@ def drawn_page(
     body = (
         f"<noscript><style>{_STILLED}</style></noscript>\n"
         f"<header>{header}</header>\n<main>{main}</main>\n<footer>{footer}</footer>\n"
-        f'<script type="text/plain" id="plotly">{_plotly().result()}</script>\n'
+        f'<script type="text/plain" id="plotly">{_packed_plotly()}</script>\n'
         f'<script type="text/plain" id="packed">{packed(figures)}</script>\n'
         f"<script>{Template(_part('drawn.js')).substitute(script=script)}</script>"
     )
@@ -67,6 +67,14 @@ def drawn_page(
 def pack_ahead() -> None:
     """Have plotly packed in a thread, for :func:`drawn_page`, while the figures are made."""
     _plotly()
+
+
+def _packed_plotly() -> str:
+    try:
+        return _plotly().result()
+    except BaseException:
+        _plotly.cache_clear()  # the next page tries anew
+        raise
 
 
 @cache

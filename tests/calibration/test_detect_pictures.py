@@ -244,3 +244,9 @@ def test_pictures_of_one_instant_must_have_one_name(image: np.ndarray) -> None:
     # What stands still needs no pairs.
     still = TargetPlan("set", (dataclasses.replace(scenes.PLATE, fixed=True),))
     assert not detect_pictures(named(left=("1",), right=("2",)), still).problems
+
+
+def test_a_picture_whose_edges_fill_next_to_nothing_is_explained_too(tmp_path: Path) -> None:
+    grey = np.zeros((300, 5200), np.uint8)
+    grey[:, :1000] = 200
+    assert exposure_problem_of(grey) is None

@@ -102,4 +102,5 @@ def _write_head(folder: Path, surface: TexturedMesh) -> None:
         uv=uv,
         tint=surface.tint,
     )
-    cv2.imwrite(str(folder / "skin.png"), surface.picture[..., ::-1])
+    # Not imwrite, which says nothing of a full disk.
+    (folder / "skin.png").write_bytes(cv2.imencode(".png", surface.picture[..., ::-1])[1].tobytes())

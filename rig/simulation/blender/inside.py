@@ -26,11 +26,12 @@ def main(folder: Path) -> None:
     """Build the scene once, photograph it with each camera."""
     scene = json.loads((folder / "scene.json").read_text(encoding="utf-8"))
     bpy.ops.wm.read_factory_settings(use_empty=True)
+    # First, so that each camera has its own name whatever else is called so.
+    runpy.run_path(str(folder / "cameras_blender.py"))
     _head(folder, scene)
     for light in scene["lights"]:
         _soft_box(light)
     _surroundings(scene)
-    runpy.run_path(str(folder / "cameras_blender.py"))
     _cycles(scene)
     for number, given in enumerate(scene["cameras"]):
         np.save(folder / f"{given['file']}.npy", _rendered(folder, given, number))
