@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,10 @@ from common.files.reading import BYTE_ORDER_MARK, readable
 
 LARGEST_FILE_BYTES = 1_000_000
 """What people write by hand is a page or two; a larger file is another one, given by mistake."""
+
+_PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+"""
+_MANY_PARTS = re.compile(rf"(?<![\w-])(?:{_PART}){{100}}")
+"""A key of so many parts is nobody's, and the time to read one grows as their square."""
 
 
 def read_text(path: Path, kind: str, words: str, largest_bytes: int = LARGEST_FILE_BYTES) -> str:
@@ -34,6 +39,8 @@ def parsed(text: str, name: str, kind: str, words: str) -> dict[str, Any]:
     A mark of the byte order, which some editors put in front unseen, is left out of account.
     """
     try:
+        if _MANY_PARTS.search(text):
+            raise RecursionError
         return tomllib.loads(text.removeprefix(BYTE_ORDER_MARK))
     except tomllib.TOMLDecodeError as error:
         why = str(error)

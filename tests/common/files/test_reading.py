@@ -107,8 +107,14 @@ def test_json_that_cannot_be_read_is_one_line(tmp_path: Path, content: str) -> N
 
 @pytest.mark.parametrize(
     ("content", "why"),
-    [(f"a = {DEEP}", "nested too deeply"), (f"a = {LONG}", "more digits than can be read")],
-    ids=["deep", "long"],
+    [
+        (f"a = {DEEP}", "nested too deeply"),
+        (f"a = {LONG}", "more digits than can be read"),
+        # A tenth of these take a second, and the time grows as their square.
+        (".".join("a" * 100_000) + " = 1", "nested too deeply"),
+        (f"a = {{'b' . {' . '.join('a' * 100_000)} = 1}}", "nested too deeply"),
+    ],
+    ids=["deep", "long", "dotted", "dotted inside"],
 )
 def test_toml_that_cannot_be_read_is_one_line(tmp_path: Path, content: str, why: str) -> None:
     path = tmp_path / "file.toml"
