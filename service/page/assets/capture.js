@@ -13,7 +13,7 @@ export function capturing(rig, signal) {
   const subject = h("input", { maxlength: 200, autocomplete: "off" });
   const operator = h("input", { maxlength: 200, autocomplete: "off" });
   const shots = h("input", { type: "number", min: 1, max: 1000, value: 1 });
-  const interval = h("input", { type: "number", min: 0, max: 1000000, value: 0 });
+  const interval = h("input", { type: "number", min: 0, max: 1000000, step: "any", value: 0 });
   const countdown = h("input", { type: "number", min: 0, max: 60, value: 0 });
   const fire = h("button", { type: "submit", class: "fire hardware" }, "Fire");
   const place = h("div", { class: "result", "aria-live": "polite" });
@@ -35,7 +35,7 @@ export function capturing(rig, signal) {
     const asked = {
       capture_id: id, session: session.value, subject: subject.value,
       operator: operator.value, shots: Number(shots.value),
-      interval_us: Number(interval.value) * 1000,
+      interval_us: Math.round(Number(interval.value) * 1000),
     };
     counting = new AbortController();
     const stopped = counting.signal;
@@ -49,8 +49,14 @@ export function capturing(rig, signal) {
       const job = await post(rig.links.captures, asked);
       if (stopped.aborted) await post(rig.links.abort); // the first may have come before the capture
       await watch(place, job, async (done) => {
-        if (again) await replaced(again.session, again.record.capture_id, id); // now that there is another
-        return outcome(done);
+        const taken = outcome(done);
+        if (!again) return taken;
+        try {
+          await replaced(again.session, again.record.capture_id, id); // now that there is another
+          return taken;
+        } catch (error) { // the new pictures are there all the same
+          return h("div", {}, taken, problem(error));
+        }
       }, signal);
       if (!signal.aborted) await left(place, own, signal);
     } catch (error) {
@@ -79,6 +85,8 @@ export function capturing(rig, signal) {
     const { record, session: name } = job.result;
     return sheet(name, record, signal, () => {
       [session.value, shots.value, interval.value] = [name, record.shots, record.interval_us / 1000];
+      // Else the next capture, of somebody else perhaps, would be taken for this one's.
+      if (counting || fire.disabled || !element.reportValidity()) return;
       former = { session: name, record };
       element.requestSubmit();
     });

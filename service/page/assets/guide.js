@@ -29,6 +29,12 @@ export function guide(targets, sessions, signal) {
   return element;
 }
 
+/** Whether a calibration would take a picture. */
+function counts(frame, id, rejected) {
+  const out = rejected.some((mark) => mark.capture_id === id && [null, frame.camera].includes(mark.camera) && [null, frame.shot].includes(mark.shot));
+  return !frame.raw && frame.status !== "incomplete" && !out;
+}
+
 /** Look at each picture of the session once, the newest captures as they come. */
 async function followed(session, set, told, place, signal) {
   const own = `/v1/sessions/${encodeURIComponent(session)}`;
@@ -36,10 +42,10 @@ async function followed(session, set, told, place, signal) {
   const looked = new Set();
   try {
     while (!signal.aborted) {
-      const { captures } = await get(own, signal);
+      const [{ captures }, { rejected }] = await Promise.all([get(own, signal), get(`${own}/marks`, signal)]);
       for (const { capture_id: id } of captures.filter((one) => !looked.has(one.capture_id))) {
         const record = await get(`${own}/captures/${encodeURIComponent(id)}`, signal);
-        for (const frame of record.frames.filter((one) => !one.raw)) {
+        for (const frame of record.frames.filter((one) => counts(one, id, rejected))) {
           told.textContent = `Looking at ${frame.camera} of ${id} …`;
           const path = frame.file.path.split("/").map(encodeURIComponent).join("/");
           const seen = await get(`${own}/fields/${path}?target_set_id=${encodeURIComponent(set)}`, signal);

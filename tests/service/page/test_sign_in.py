@@ -48,10 +48,11 @@ def test_who_has_a_key_comes_in_and_may_what_it_says(
         links = one.page.get_by_role("navigation").get_by_role("link").all()
         assert len({link.bounding_box()["y"] for link in links}) == 1
         one.press("Sign out")
-        one.see("Your key")
+        # By its label: "Your key may look and stop" is there until the door comes.
+        one.page.get_by_label("Your key").wait_for()
         assert one.page.get_by_text("Trigger box").count() == 0
         one.page.get_by_label("Your key").fill(token)
         one.press("Sign in")
         one.see("Trigger box: ready")
         revoke_key(data, "anna")
-        one.see("Your key")
+        one.page.get_by_label("Your key").wait_for()
