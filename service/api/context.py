@@ -78,6 +78,8 @@ class Service:
         )
         self.stopping = threading.Event()
         self.imports = CapacityLimiter(_IMPORTS_AT_ONCE)
+        # A look takes a core for a second; those that wait must not hold the threads that abort.
+        self.looks = CapacityLimiter(1)
 
     def start(self) -> None:
         """Begin with the jobs that wait, and open the rigs."""

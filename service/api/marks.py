@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
+from anyio import to_thread
 from fastapi import APIRouter, Query, Request
 from pydantic import Field
 
@@ -83,12 +84,16 @@ def accept_pictures(
     response_model=FiledLook,
     responses=problems(404, 422),
 )
-def read_look(service: ServiceDep, session: str, path: str) -> FiledLook:
+async def read_look(service: ServiceDep, session: str, path: str) -> FiledLook:
     """Look whether a picture is sharp and whole, by the path that its capture's record gives.
 
     One is looked at at a time; what was seen of a picture is kept.
     """
-    return filed_look(service.rigs.session_folder(session), path)
+
+    def look() -> FiledLook:
+        return filed_look(service.rigs.session_folder(session), path)
+
+    return await to_thread.run_sync(look, limiter=service.looks)
 
 
 @router.get(
@@ -96,7 +101,7 @@ def read_look(service: ServiceDep, session: str, path: str) -> FiledLook:
     response_model=FieldSeen,
     responses=problems(404, 422),
 )
-def read_field(
+async def read_field(
     service: ServiceDep, session: str, path: str, target_set_id: Annotated[Id, Query()]
 ) -> FieldSeen:
     """Look where a picture shows targets, by the path that its capture's record gives.
@@ -104,5 +109,9 @@ def read_field(
     All pictures of a camera together tell which part of its field is still empty. One is looked
     at at a time; what was seen of a picture is kept.
     """
-    targets = target_file(service, target_set_id)
-    return field_seen(service.rigs.session_folder(session), path, targets)
+
+    def look() -> FieldSeen:
+        targets = target_file(service, target_set_id)
+        return field_seen(service.rigs.session_folder(session), path, targets)
+
+    return await to_thread.run_sync(look, limiter=service.looks)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from functools import lru_cache
 from pathlib import Path
 from typing import Annotated
@@ -15,12 +14,10 @@ from calibration.fieldcells import GRID, cells_of
 from calibration.targets.files import read_targets
 from rig.acquisition.imaging import decoded, shrunk
 from service.kinds.base import Result
-from service.stations.judged import picture_of
+from service.stations.judged import picture_bytes, picture_of
 from service.stations.liveview import SEARCHED_PX
 
 _KEPT = 4096
-_looking = threading.Lock()
-"""One at a time: finding targets takes a core for about a second."""
 
 
 class FieldSeen(Result):
@@ -40,11 +37,10 @@ def field_seen(folder: Path, path: str, targets: Path) -> FieldSeen:
     """Where the picture that a record names ``path`` shows targets of the file ``targets``.
 
     Raises :class:`~common.errors.NotFoundError` for no picture. The picture is looked at smaller,
-    so that finest targets may go unseen that a calibration finds.
+    so that finest targets may go unseen that a calibration finds. Takes a core for about a second.
     """
     frame = picture_of(folder, path)
-    with _looking:
-        count, cells = _seen(folder / path, frame.file.sha256, targets)
+    count, cells = _seen(folder / path, frame.file.sha256, targets)
     return FieldSeen(path=path, camera=frame.camera, targets=count, cells=list(cells))
 
 
@@ -52,7 +48,7 @@ def field_seen(folder: Path, path: str, targets: Path) -> FieldSeen:
 def _seen(path: Path, sha256: str, targets: Path) -> tuple[int, tuple[tuple[int, int], ...]]:
     """Of files with contents that never change."""
     del sha256
-    pixels = decoded(path.read_bytes())
+    pixels = decoded(picture_bytes(path))
     if pixels is None:
         return 0, ()
     small = shrunk(pixels, SEARCHED_PX)

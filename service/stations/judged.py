@@ -29,9 +29,6 @@ from rig.acquisition.session.storage import Disk
 from service.kinds.base import Figure, Result
 
 _KEPT = 4096
-_looking = threading.Lock()
-"""One at a time: a large picture takes a core for half a second, and the cores have other work."""
-
 _marking = threading.Lock()
 
 
@@ -65,10 +62,12 @@ def picture_of(folder: Path, path: str) -> FrameEntry:
 
 
 def filed_look(folder: Path, path: str) -> FiledLook:
-    """Look at the picture that a record names ``path``. Raises :class:`NotFoundError`."""
+    """Look at the picture that a record names ``path``. Raises :class:`NotFoundError`.
+
+    A large picture takes a core for half a second.
+    """
     frame = picture_of(folder, path)
-    with _looking:
-        seen = _seen(folder / path, frame.file.sha256)
+    seen = _seen(folder / path, frame.file.sha256)
     came = frame.status != FrameStatus.INCOMPLETE
     return seen.model_copy(update={"path": path, "whole": seen.whole and came})
 
@@ -77,7 +76,7 @@ def filed_look(folder: Path, path: str) -> FiledLook:
 def _seen(path: Path, sha256: str) -> FiledLook:
     """Of a file with that content, which never changes."""
     del sha256
-    pixels = decoded(path.read_bytes())
+    pixels = decoded(picture_bytes(path))
     look = None if pixels is None else look_at(pixels)
     return FiledLook(
         path="",
@@ -87,6 +86,16 @@ def _seen(path: Path, sha256: str) -> FiledLook:
         image_size_px=None if look is None else look.size_px,
         warnings=[] if look is None else list(look.warnings),
     )
+
+
+def picture_bytes(path: Path) -> bytes:
+    """A filed picture as it is. Raises :class:`NotFoundError` for one that was removed since."""
+    try:
+        return path.read_bytes()
+    except FileNotFoundError as error:
+        raise NotFoundError(
+            "session-file", f"the picture {path.name!r} is not there any more", "see /v1/sessions"
+        ) from error
 
 
 def _frame(index: SessionIndex, path: str) -> FrameEntry:

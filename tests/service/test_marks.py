@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import io
 import json
+import threading
 import zipfile
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +19,7 @@ from stations import write_station
 
 from common.errors import InputError
 from service.pictures.listing import pictures_in_session
+from service.stations.judged import FiledLook, filed_look
 
 JSON = dict[str, Any]
 
@@ -137,3 +140,26 @@ def test_how_pictures_look(lab: tuple[TestClient, Path]) -> None:
 @pytest.mark.parametrize("path", ["session.json", "images/rig1/cam01/000099.png", "..%2f..%2fx"])
 def test_only_pictures_are_looked_at(lab: tuple[TestClient, Path], path: str) -> None:
     assert lab[0].get(f"/v1/sessions/anna/looks/{path}").status_code == 404
+
+
+def test_many_who_look_hold_up_nobody_who_aborts(
+    service: TestClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    going_on, looks = threading.Event(), 60  # of 40 threads that answer
+
+    def slow(folder: Path, path: str) -> FiledLook:
+        assert going_on.wait(60.0)
+        return filed_look(folder, path)
+
+    monkeypatch.setattr("service.api.marks.filed_look", slow)
+    record = service.get("/v1/sessions/anna/captures/one").json()
+    own = f"/v1/sessions/anna/looks/{record['frames'][0]['file']['path']}"
+    with ThreadPoolExecutor(looks + 1) as clients:
+        try:
+            asked = [clients.submit(service.get, own) for _ in range(looks)]
+            aborted = clients.submit(service.post, "/v1/rigs/studio/abort")
+            assert aborted.result(20.0).status_code < 300
+            assert not any(one.done() for one in asked)
+        finally:
+            going_on.set()
+        assert {one.result(60.0).status_code for one in asked} == {200}

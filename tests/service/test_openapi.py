@@ -89,7 +89,7 @@ def test_only_what_waits_for_others_is_answered_in_the_event_loop() -> None:
     }
     assert len(ours) > 100
     assert {name for name in waiting if not name.startswith("follow_")} == {
-        "add_scan", "add_picture_set"
+        "add_scan", "add_picture_set", "read_look", "read_field"
     }  # fmt: skip
 
 
